@@ -25,6 +25,7 @@ test-slow: $(READY) ## Run the slow tests; COVERAGE=1 adds to what `make test` m
 check: check-client site ## Lint, strict types, import contracts, security, the site
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	.ci/check-prose
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/bandit --quiet --recursive --configfile pyproject.toml mjsim planner hud experiments studies

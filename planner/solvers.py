@@ -46,6 +46,7 @@ class SolveLimit:
 
     @property
     def stopped(self) -> bool:
+        """True if the solver must stop."""
         return self.stop is not None and self.stop.is_set()
 
 

@@ -25,7 +25,7 @@ COLUMNS = (
 SUMMARY = ("", "rows", "agree", "judged", "of", "the truth, 5 to 95 %")
 NOT_FITTED = (
     "All numbers of objects, not fitted. These rows contain the people at 6 objects, and their authors had seen them: "
-    "they are no test on data that nobody knew."
+    "they are not a test on unseen data."
 )
 TITLE = "Score against the published study"
 

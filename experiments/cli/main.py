@@ -151,7 +151,7 @@ def _run(words: list[str]) -> int:
     except FileNotFoundError as error:
         raise OSError(error.errno, "the current folder was removed; change to another one") from error
     if here not in sys.path:
-        sys.path.append(here)  # lets users import their own modules from the current folder
+        sys.path.append(here)  # lets users import modules from the current folder
     commands = parser(*known)
     if bad := next((word for word in words if word.startswith("--") and word.endswith("=--")), None):
         commands.error(f"{bad} has no value")  # argparse would turn the missing value into an empty list

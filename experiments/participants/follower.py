@@ -19,6 +19,7 @@ class BreadcrumbFollower:
         self._executor = VisitExecutor(house)
 
     def act(self, percept: Percept) -> Action:
+        """Return the action for the next control step."""
         if percept.busy or percept.guidance is None:
             return WAIT
         return self._executor.follow(percept, percept.guidance)
@@ -34,6 +35,7 @@ class Follower:
         self._conduct: Participant | None = None
 
     def act(self, percept: Percept) -> Action:
+        """Return the action for the next control step."""
         if self._conduct is None:
             self._conduct = self._choose(percept.shown_roles)
         return self._conduct.act(percept)

@@ -1,4 +1,4 @@
-"""A participant who always makes the nearest possible visit, and who finds objects by their flagpoles."""
+"""A participant who always makes the nearest possible visit, and finds objects by their flagpoles."""
 
 import numpy as np
 
@@ -26,6 +26,7 @@ class Nearest:
         self._next_look = 0.0
 
     def act(self, percept: Percept) -> Action:
+        """Return the action for the next control step."""
         if percept.busy:
             return WAIT
         self._look(percept)

@@ -33,7 +33,7 @@ Inputs = Mapping[str, str]
 
 
 def trial_inputs(config: TrialConfig, catalogue: Catalogue) -> dict[str, str]:
-    """Return the hashes and versions of everything on which a trial depends besides its settings, by name."""
+    """Return the hashes and versions of everything on which a trial depends in addition to its settings, by name."""
     inputs = {"house": catalogue.content, **code_versions()}
     if config.episode is not None:
         inputs["episode"] = hashlib.sha256(read_bytes(Path(config.episode))).hexdigest()

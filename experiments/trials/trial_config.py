@@ -225,6 +225,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @property
     def phase_names(self) -> tuple[str, ...]:
+        """Names of the trial's phases, in order."""
         return phases_of(self.phases)
 
     @property

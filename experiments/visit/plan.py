@@ -91,4 +91,5 @@ class VisitPlan:
 
     @property
     def story_paragraphs(self) -> list[str]:
+        """The paragraphs of the story."""
         return [part for part in self.story.split("\n\n") if part.strip()]

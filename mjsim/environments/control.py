@@ -23,7 +23,8 @@ Steps = Generator[Action, StepResult, None]
 class Control(Protocol):
     """Protocol for classes that convert agent actions into simulator actions."""
 
-    def spec(self) -> specs.BoundedArray: ...
+    def spec(self) -> specs.BoundedArray:
+        """Return the specification of an action."""
 
     def steps(self, action: Any, observation: Observation, world: World) -> Steps:
         """Yield the simulator actions that carry out one agent action.
@@ -61,9 +62,11 @@ class Continuous:
             raise EnvironmentConfigError(f"repeat must be at least 1 control step, got {self.repeat}")
 
     def spec(self) -> specs.BoundedArray:
+        """Return the specification of an action."""
         return specs.BoundedArray((4,), np.float32, -1.0, 1.0, name="action")
 
     def steps(self, action: Any, observation: Observation, world: World) -> Steps:  # noqa: ARG002
+        """Return the steps that execute an action. Raise an ActionError if the action is invalid."""
         try:
             values = np.asarray(action, dtype=np.float64)
         except (TypeError, ValueError):
@@ -106,9 +109,11 @@ class Discrete:
             )
 
     def spec(self) -> specs.BoundedArray:
+        """Return the specification of an action."""
         return specs.DiscreteArray(len(MOVES), dtype=np.int64, name="action")
 
     def steps(self, action: Any, observation: Observation, world: World) -> Steps:
+        """Return the steps that execute an action. Raise an ActionError if the action is invalid."""
         index = np.asarray(action)
         if index.ndim or not np.issubdtype(index.dtype, np.integer) or not 0 <= index < len(MOVES):
             raise ActionError(f"an action is a whole number below {len(MOVES)}, got {action!r}")

@@ -90,10 +90,12 @@ class Rearrangement:
 
     @property
     def observation_spec(self) -> dict[str, specs.Array]:
+        """Specifications of the observation arrays, by sensor name."""
         return {s.name: s.spec(self.layout) for s in self.sensors}
 
     @property
     def action_spec(self) -> specs.BoundedArray:
+        """The specification of an action."""
         return self.control.spec()
 
     @property

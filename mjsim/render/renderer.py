@@ -79,14 +79,17 @@ class Renderer(OffScreenRenderer):
 
     @property
     def width(self) -> int:
+        """Width of a frame, in pixels."""
         return self._rasteriser.size[0]
 
     @property
     def height(self) -> int:
+        """Height of a frame, in pixels."""
         return self._rasteriser.size[1]
 
     @property
     def profile(self) -> RenderProfile:
+        """The current quality settings."""
         return self._profile
 
     def rgb(

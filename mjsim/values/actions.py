@@ -181,6 +181,7 @@ class ActionResult:
 
     @property
     def applied(self) -> bool:
+        """True if the action was executed."""
         return self.refusal is None
 
 

@@ -105,6 +105,7 @@ class Episode:
             raise EpisodeError(f"episode is not JSON: {error}") from error
 
     def save(self, path: Path) -> None:
+        """Write the episode to a JSON file atomically."""
         write_text_atomically(path, self.to_json())
 
     @classmethod

@@ -55,9 +55,11 @@ class Observation:
 
     @property
     def carried(self) -> tuple[str, ...]:
+        """Instance names of the carried objects."""
         return tuple(name for name in self.hands if name is not None)
 
     def names_with(self, status: ObjectStatus) -> tuple[str, ...]:
+        """Return the instance names of all objects with this status."""
         return tuple(n for n, s in zip(self.object_names, self.object_status, strict=True) if s is status)
 
 

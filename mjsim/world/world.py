@@ -102,6 +102,7 @@ class World:
 
     @property
     def model(self) -> mujoco.MjModel:
+        """The compiled MuJoCo model."""
         return self.scene.model
 
     @property
@@ -117,6 +118,7 @@ class World:
 
     @property
     def control_timestep(self) -> float:
+        """Duration of a control step, in seconds."""
         return self.options.control_timestep
 
     @property
@@ -250,6 +252,7 @@ class World:
         return self._tier.answer(action)
 
     def observation(self) -> Observation:
+        """Return the current observation."""
         return self._tier.observation()
 
 

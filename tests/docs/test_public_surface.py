@@ -2,10 +2,12 @@
 
 import ast
 import importlib
+import inspect
 import json
 import re
 from collections import Counter
 from pathlib import Path
+from types import FunctionType
 
 import pytest
 
@@ -81,3 +83,21 @@ def test_documents_and_examples_use_public_paths():
     paths = {(page.name, *path) for page in PAGES for code in code_of(page) for path in used(code)}
     assert len({page for page, _, _ in paths}) > 10, "the imports of the pages were not found"
     assert {path for path in paths if not is_public(*path[1:])} == set()
+
+
+@pytest.mark.parametrize("module", PUBLIC)
+def test_every_public_function_class_and_method_has_a_docstring(module):
+    """Ruff asks for them where they may not be left out as echoes."""
+    public = {name: getattr(importlib.import_module(module), name) for name in NAMES[module]}
+    defined = {
+        name: value for name, value in public.items() if inspect.isclass(value) or inspect.isfunction(value)
+    }
+    for name, value in list(defined.items()):
+        own = vars(value).items() if inspect.isclass(value) else ()
+        defined |= {
+            f"{name}.{key}": getattr(value, key)
+            for key, member in own
+            if not key.startswith("_")
+            and isinstance(member, FunctionType | property | classmethod | staticmethod)
+        }
+    assert [name for name, value in defined.items() if not inspect.getdoc(value)] == []

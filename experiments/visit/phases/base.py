@@ -75,7 +75,8 @@ class Phase(Protocol):
         """Return the page to show. `refused` is given if the participant's last form was rejected."""
         ...
 
-    def read(self, visitor: Visitor, sent: FormData) -> Done | Again: ...
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+        """Validate a submitted form. Return its values, or the reason why the form is refused."""
 
 
 class FormPhase:
@@ -88,9 +89,11 @@ class FormPhase:
 
     @property
     def items(self) -> Sequence[Item]:
+        """Questions of the form."""
         return self.texts.items
 
     def page(self, visitor: Visitor, refused: Again | None = None) -> Page:
+        """Return the page with the form, filled with refused, drafted or earlier values."""
         form = refused.values.get("form") if refused else None
         return Page(
             self._template,
@@ -104,9 +107,11 @@ class FormPhase:
         )
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - used by subclasses
+        """Return additional values for the page's template."""
         return {}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+        """Validate a submitted form. Return its values, or the reason why the form is refused."""
         form = self._form(sent, visitor.answers)
         if not form.validate():
             return Again(self._plan.texts["common"]["faults"], {"form": form})
@@ -141,6 +146,7 @@ class Story(FormPhase):
     """The page with the background story of the task."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
+        """Return additional values for the page's template."""
         return {"paragraphs": self._plan.story_paragraphs}
 
 
@@ -148,6 +154,7 @@ class ResultPhase(FormPhase):
     """The result page, which shows the metrics of the task and may offer a link to play again."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:
+        """Return additional values for the page's template."""
         return {
             "metrics": visitor.metrics,
             "path": visitor.path,
@@ -160,6 +167,7 @@ class Consent(FormPhase):
     """The consent form, including any additional questions from the study's texts."""
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+        """Validate a submitted form. Return its values, or the reason why the form is refused."""
         if sent.get("agree") == "no":
             return Done({"agreed": False}, "no_consent")
         if sent.get("agree") != "yes":
@@ -175,9 +183,11 @@ class Comprehension(FormPhase):
     """The comprehension check. A participant who fails too many attempts is screened out."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
+        """Return additional values for the page's template."""
         return {"story": self._plan.story_paragraphs}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+        """Validate a submitted form. Return its values, or the reason why the form is refused."""
         read = super().read(visitor, sent)
         if isinstance(read, Again):
             return read
@@ -194,6 +204,7 @@ class Survey(FormPhase):
     """The survey. A participant who fails too many attention checks is screened out."""
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+        """Validate a submitted form. Return its values, or the reason why the form is refused."""
         read = super().read(visitor, sent)
         allowed = self._plan.limits.inattentive
         if isinstance(read, Again) or allowed is None:
@@ -240,7 +251,9 @@ class TrialPhase:
         self._plan = plan
 
     def page(self, visitor: Visitor, refused: Again | None = None) -> Page:  # noqa: ARG002 - there is no form
+        """Return the page with the form, filled with refused, drafted or earlier values."""
         return Page("play", {"trial": self.name})
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002 - there is no form
+        """Validate a submitted form. Return its values, or the reason why the form is refused."""
         return Again(self._plan.texts["common"]["too_early"])

@@ -59,7 +59,7 @@ class Hosts(StorePart):
         return await self._database.write(work)
 
     async def drain(self, name: str, draining: bool, who: str) -> None:
-        """Stop or allow new visits on a host. Visits that have already begun are not affected."""
+        """Stop or allow new visits on a host. Visits that have already started are not affected."""
 
         async def work(connection: AsyncConnection) -> None:
             mine = (host.c.study_id == self._study_id, host.c.name == name)

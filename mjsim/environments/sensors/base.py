@@ -94,6 +94,7 @@ class SensorInput:
 
     @property
     def start(self) -> StartPose:
+        """The person's pose at the start of the episode."""
         return self.world.scene.episode.start
 
     @cached_property
@@ -136,6 +137,7 @@ class Sensor:
     images: frozenset[str] = field(default_factory=frozenset)
 
     def spec(self, layout: ObservationLayout) -> specs.Array:
+        """Return the specification of the sensor's array."""
         return self.declare(layout).replace(name=self.name)
 
 

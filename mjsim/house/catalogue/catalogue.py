@@ -87,6 +87,7 @@ class Catalogue:
 
     @property
     def name(self) -> str:
+        """The house's name, as given on the command line."""
         return self.ref.name
 
     def in_language(self, language: str) -> "Catalogue":

@@ -51,6 +51,7 @@ class Disorder:
         return cls(counts, tuple(found.distances))
 
     def tables(self) -> dict[str, list[dict[str, int]] | list[float]]:
+        """Return the content of the TOML tables that `mjsim house import` writes."""
         counts = sorted(Counter(self.misplaced).items())
         return {
             "misplaced": [{"objects": n, "episodes": k} for n, k in counts],

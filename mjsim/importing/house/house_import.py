@@ -152,7 +152,9 @@ def _converted(
     if not solids.solids and any(piece.seen and not piece.solid for piece in still):
         still = [replace(piece, solid=piece.seen) for piece in still]
         solids = make_solids(still)
-        decisions.append(ImportDecision("solid", "what is seen", "what the source lets collide is no house"))
+        decisions.append(
+            ImportDecision("solid", "visual meshes", "the collision meshes of the source do not form a house")
+        )
     if not solids.solids:
         raise AssetError("has no walls and no furniture; is it a house?")
     floor = _floor(still)

@@ -65,7 +65,7 @@ class MotionTrajectory(NamedTuple):
 
 
 class HandMovement(NamedTuple):
-    """A movement of a hand to a goal, and the direction in which the person looks meanwhile."""
+    """A movement of a hand to a goal, and the direction in which the person looks during it."""
 
     hand: int
     goal: Floats  # final position in metres, shape (3,)

@@ -37,6 +37,7 @@ class Walker:
         self.reset()
 
     def reset(self) -> None:
+        """Forget the current visit and its progress."""
         self._visit: Pick | Place | None = None
         self._back_off_until = -math.inf
         self.progress = np.array([np.inf, 0.0])

@@ -112,7 +112,7 @@ test("without WebGL 2 the page learns it", () => {
   expect(() => new World3D(old)).toThrow("no WebGL 2");
 });
 
-test("a lost context is told", () => {
+test("reports a lost context", () => {
   const lost = vi.fn();
   world.onLost = lost;
   element.dispatchEvent(new Event("webglcontextlost"));

@@ -42,7 +42,7 @@ describe("a view that this browser draws", () => {
     expect(world.loadModels).toHaveBeenCalledWith(["mug"]);
   });
 
-  test("loads a house once, also where it is told again meanwhile", async () => {
+  test("loads a house once if the same scene arrives twice", async () => {
     world.load.mockClear();
     const other = new DrawnView(/** @type {HTMLCanvasElement} */ ({}), () => {});
     await Promise.all([other.load(SCENE), other.load(SCENE)]);
@@ -82,7 +82,7 @@ describe("a view that this browser draws", () => {
     expect(sent.at(-1)).toBe(6);
   });
 
-  test("forgets objects when a scene comes anew, as after a resize", async () => {
+  test("forgets objects when another scene arrives, as after a resize", async () => {
     view.take(state({ objects: { a: [0, 0, 0, 1, 0, 0, 0], b: [1, 0, 0, 1, 0, 0, 0] }, models: { a: "mug", b: "mug" } }), 10);
     await view.load(SCENE);
     view.take(state({ step: 1, objects: { b: [2, 0, 0, 1, 0, 0, 0] }, models: { b: "mug" } }), 50);

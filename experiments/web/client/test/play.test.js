@@ -5,7 +5,7 @@ import { REPLACED, TOO_MUCH } from "../static/protocol.js";
 import { FakeSocket, frame, showPage, watchListeners } from "./page.js";
 import { EMPTY, GAIT, SPEEDS } from "./walks.js";
 
-// Every test loads the page anew, but not these.
+// Every test reloads the page, except for these modules.
 const { fake, three } = await vi.hoisted(async () => ({ fake: await import("./fake_world.js"), three: await import("../static/vendor/three.js") }));
 vi.mock("../static/drawing/world.js", () => fake);
 vi.mock("../static/vendor/three.js", () => three);
@@ -175,7 +175,7 @@ describe("while the clock runs", () => {
     expect(socket().inputs.at(-1)).toMatchObject({ press: "act" });
   });
 
-  test("how well it was seen is told, and shown where that is asked for", async () => {
+  test("the display quality is reported, and shown with ?debug", async () => {
     history.replaceState({}, "", "/play/token?debug");
     await running();
     for (let number = 2; number < 152; number++) {
@@ -236,7 +236,7 @@ describe("while the clock runs", () => {
     expect(help.open).toBe(true);
   });
 
-  test("a new size of the window is told once it stays", async () => {
+  test("a new size of the window is reported once it is stable", async () => {
     await running();
     part("screen").getBoundingClientRect = () => new DOMRect(0, 0, 320, 240);
     window.dispatchEvent(new Event("resize"));
@@ -431,7 +431,7 @@ describe("a browser that draws", () => {
     expect(part("busy").hidden).toBe(true);
   });
 
-  test("goes on drawing while it is fast enough", async () => {
+  test("keeps drawing while it is fast enough", async () => {
     await running({ draw: "auto" });
     for (let step = 0; step < 250; step++) {
       vi.advanceTimersByTime(40);
