@@ -615,7 +615,7 @@ def test_a_page_that_connects_again_need_not_ask(client):
         started(first)
         with connected(client, link) as second:
             second.send_json(hello())
-            assert until_phase(second, "paused")["reason"] == "taken over"
+            assert until_phase(second, "paused")["reason"] == "disconnected"
 
 
 def test_without_a_browser_the_session_is_paused(client, pool):
