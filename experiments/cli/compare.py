@@ -23,8 +23,8 @@ WIDTH = 160  # width of the output in characters if it is not written to a termi
 DESCRIPTION = """\
 Compare each pair of assistance conditions in a batch. Two trials form a pair if they differ only in the assistance:
 they have the same three seeds, number of objects, participant, house and so on. For each metric, print the means, the
-mean difference (second minus first) and the effect size d_z (the difference in standard deviations of the differences),
-both with 95 % confidence intervals. Trials without a counterpart are listed and left out."""
+mean difference (second minus first) and the effect size d_z (the mean difference divided by the standard deviation of
+the differences), both with 95 % confidence intervals. Trials without a counterpart are listed and left out."""
 
 
 def add_parser(commands: Any) -> None:

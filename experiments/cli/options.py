@@ -77,7 +77,10 @@ class HelpFormatter(argparse.RawDescriptionHelpFormatter, argparse.ArgumentDefau
     """A help formatter that keeps line breaks in descriptions and shows the default values of options."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        has_default = action.option_strings and action.default is not None and action.nargs != 0
+        default, said = action.default, "(default: " in (action.help or "")
+        has_default = (
+            action.option_strings and action.nargs != 0 and default not in (None, (), [], {}) and not said
+        )
         return super()._get_help_string(action) if has_default else action.help
 
 

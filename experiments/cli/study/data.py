@@ -56,7 +56,7 @@ erasure and the payments made. Participants who are owed a payment must be paid 
 
 FORGET = """\
 Delete identifying data of participants who were last active more than keep_days ([study.limits]) ago: platform ids,
-keys that recognise participants, and links, also in the backups that the study knows of. Behaviour and answers are kept
+keys that recognize participants, and links, also in the backups that the study knows of. Behaviour and answers are kept
 under a number, but participants who wanted their data deleted are erased. Participants who are owed a payment are kept
 until they are paid. The server does the same daily. Run this command after the study."""
 
