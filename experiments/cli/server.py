@@ -28,7 +28,9 @@ MAX_FILES = 16384  # limit on open files, including sockets
 
 def add_server_options(group: Any) -> None:
     group.add_argument("--port", type=number(0, 65535), default=PORT, help="TCP port, or 0 for any free port")
-    group.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="address to listen at")
+    group.add_argument(
+        "--host", type=_host, default="127.0.0.1", metavar="ADDRESS", help="address to listen on"
+    )
     group.add_argument(
         "--public-url", metavar="URL", help="public URL of the server behind a proxy (docs/deploy.md)"
     )
@@ -125,7 +127,10 @@ def check_public_url(url: str | None) -> None:
     """Raise ConfigError unless the public URL has the form `https://play.example.org` or is None."""
     if url is None:
         return
-    parts = urlsplit(url)
+    try:
+        parts = urlsplit(url)
+    except ValueError:  # an address in brackets is incomplete
+        parts = urlsplit("")
     if parts.scheme not in ("http", "https") or not parts.netloc or parts.path not in ("", "/"):
         raise ConfigError(f"public URL {url!r} must be of the form https://play.example.org")
 
@@ -135,6 +140,13 @@ def url_of(listener: socket.socket) -> str:
     host, port = listener.getsockname()[:2]
     shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
     return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"
+
+
+def _host(text: str) -> str:
+    """Refuse an empty address, with which a socket would listen on all addresses."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("is empty; name an address, or 0.0.0.0 for all")
+    return text
 
 
 def _networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:

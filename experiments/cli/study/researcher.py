@@ -50,11 +50,12 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"`{arguments.what}` needs the NAME of an account")
     if arguments.what == "add" and not arguments.role:
         raise ConfigError(f"`add` needs --role: {', '.join(ROLES)}")
-    study = people_study(arguments)
-    arguments.folder.mkdir(
-        parents=True, exist_ok=True
-    )  # the folder does not exist if an account is created before the server first starts
-    url = arguments.database or sqlite_url(arguments.folder / DATABASE)
+    study, url = people_study(arguments), None
+    if (
+        arguments.what == "add" and not arguments.database
+    ):  # accounts may be created before the server first starts
+        arguments.folder.mkdir(parents=True, exist_ok=True)
+        url = sqlite_url(arguments.folder / DATABASE)
     with_store(study, arguments, lambda store: _do(store, arguments), url)
     return 0
 
@@ -83,6 +84,8 @@ def _password(arguments: argparse.Namespace) -> str:
         password = secrets.token_urlsafe(18)
         print(password)
         return password
+    if sys.stdin is None or sys.stdin.closed:
+        raise ConfigError("standard input is closed, so no password can be read; --generate makes one")
     if sys.stdin.isatty():
         password = getpass.getpass(f"Password of {arguments.name}: ")
         if getpass.getpass("Again: ") != password:

@@ -86,6 +86,7 @@ def test_the_overview_names_every_command():
         ([*PLAY, "--objects", "0"], "objects is 0"),
         ([*PLAY, "--film", "nothing.mp4"], "film nothing.mp4 does not exist"),
         ([*PLAY, "--public-url", "ftp://x"], "must be of the form"),
+        ([*PLAY, "--public-url", "http://[::1"], "must be of the form"),
         ([*PLAY, "--minimum", "flythrough=60"], "refers to the phase flythrough, which is not shown"),
         (
             [*PLAY, "--phases", "task", "--questions", "q.toml"],
@@ -247,3 +248,9 @@ main()
 numpy.ones(1) / numpy.zeros(1)"""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "nowhere.json" in done.stderr and "Warning" not in done.stderr
+
+
+def test_an_empty_host_does_not_mean_all_addresses(capsys):
+    with pytest.raises(SystemExit):
+        main([*PLAY, "--host", ""])
+    assert "is empty; name an address" in capsys.readouterr().err

@@ -291,6 +291,12 @@ def test_researchers_are_made_on_the_command_line_and_passwords_never_stand_on_i
     assert capsys.readouterr().out == "ada  viewer  disabled\n"
     assert command("add", "eve", "--role", "assistant", "--generate") == 0
     assert len(capsys.readouterr().out.split("\n")[0]) == 24
+    monkeypatch.setattr("sys.stdin", None)
+    assert main(["study", "researcher", "add", *names, "ivy", "--role", "viewer"]) == 2
+    assert "standard input is closed" in capsys.readouterr().err
+    names[1] = str(tmp_path / "another")  # a misspelt folder is not created
+    assert command("list") == 2
+    assert not (tmp_path / "another").exists()
 
 
 @pytest.mark.slow
