@@ -160,7 +160,7 @@ class Ledger(StorePart):
         if kind in ONCE:
             given = select(payment.c.key).where(payment.c.person_id == person_id, payment.c.kind.in_(ONCE))
             if (before := (await connection.execute(given)).scalar()) is not None:
-                raise StoreError(f"Person {person_id} has payment {before!r}. Any addition must be a bonus.")
+                raise StoreError(f"Person {person_id} has payment {before!r}. An addition is a bonus.")
 
     async def _add(
         self,
