@@ -175,17 +175,17 @@ export class Picture {
     const draw = /** @type {"browser" | "server"} */ (this.drawn ? "browser" : "server");
     const { renderer } = this;
     const field = this.#chosen === null ? {} : { field_of_view: this.#chosen };
-    if (slow && this.drawing === "ready") this.#lighten();
+    if (slow && this.drawing === "ready" && this.#wanted === "auto") this.#lighten();
     return { draw, renderer, ...field, ...seen };
   }
 
-  /** Draws with a lower resolution. If that is the lowest one already, the server draws, unless the browser must. */
+  /** Draws with a lower resolution, or, if that is the lowest one already, lets the server draw. */
   #lighten() {
     if (this.#scale * COARSER >= COARSEST) {
       this.#scale *= COARSER;
       this.resize();
       this.#events.send({ type: "draw", draw: "browser", reason: `slow: ${Math.round(100 * this.#scale)} % of the resolution` });
-    } else if (this.#wanted === "auto") this.fallBack("slow");
+    } else this.fallBack("slow");
   }
 
   /** Lets the server draw until the page is loaded again. @param {string} reason */
