@@ -2,15 +2,18 @@
 
 import asyncio
 import random
+import sqlite3
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any, TypeVar
 
 from sqlalchemy import URL, Connection, event, make_url, text
 from sqlalchemy.exc import ArgumentError, DBAPIError, IntegrityError, NoSuchModuleError, SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
+from sqlalchemy.util import await_only
 
 from experiments.errors import StoreError
 from experiments.visit.store.failures import advice, damaged, passes
@@ -26,7 +29,6 @@ DRIVERS = {
     "postgresql": "postgresql+psycopg",
 }
 PRAGMAS = (
-    "PRAGMA journal_mode = WAL",
     "PRAGMA synchronous = FULL",  # makes commits durable
     "PRAGMA foreign_keys = ON",
     "PRAGMA secure_delete = ON",  # overwrites the content of deleted rows
@@ -271,9 +273,24 @@ def _engine(url: URL) -> AsyncEngine:
 def _prepare(connection: Any, record: Any) -> None:  # noqa: ARG001
     connection.isolation_level = None  # disables the driver's implicit transactions
     cursor = connection.cursor()
+    _use_wal(cursor)
     for pragma in PRAGMAS:
         cursor.execute(pragma)
     cursor.close()
+
+
+def _use_wal(cursor: Any) -> None:
+    """Switch the file to WAL mode. If several connections try this at once, SQLite refuses without waiting."""
+    until = time.monotonic() + PATIENCE_S
+    for attempt in count(1):
+        try:
+            cursor.execute("PRAGMA journal_mode = WAL")
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > until:
+                raise
+            await_only(_pause(min(attempt, TRIES)))
+        else:
+            return
 
 
 def _begin(connection: Connection) -> None:

@@ -4,6 +4,8 @@ import asyncio
 import shutil
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -150,6 +152,22 @@ async def test_an_upgrade_that_was_interrupted_goes_on(url):
     store = await Store.open(url, "pilot", "0" * 64)
     assert await store.researchers.who("a" * 64) is None
     await store.close()
+
+
+def test_a_new_sqlite_file_is_opened_by_several_at_once(tmp_path):
+    """SQLite refuses at once, whatever the timeout, if two connections switch a file to WAL mode together."""
+
+    async def use(url):
+        database = Database(url)
+        together.wait()
+        await database.check()
+        await database.close()
+
+    together = threading.Barrier(4)
+    with ThreadPoolExecutor(4) as pool:
+        for number in range(40):
+            url = f"sqlite:///{tmp_path / f'{number}.db'}"
+            list(pool.map(lambda url: asyncio.run(use(url)), [url] * 4))
 
 
 async def test_two_processes_that_start_at_once_make_one_study(url):
