@@ -19,7 +19,7 @@ import { pauseReason, resumes, shownIn } from "./page_state.js";
 import { Panel } from "./panel.js";
 import { Picture } from "./picture.js";
 import { connectMouse, connectTouch } from "./pointer.js";
-import { BEAT_PERIOD, DISPLAY_PERIOD, } from "./protocol.js";
+import { BEAT_PERIOD, DISPLAY_PERIOD } from "./protocol.js";
 import { Session } from "./session.js";
 import { Settings } from "./settings.js";
 import { Sounds } from "./sounds.js";
@@ -158,7 +158,6 @@ function update() {
   const now = state();
   if (resumes(now)) return run();
   const next = shownIn(now);
-  if (stopping && next === "task") return; // the server is about to confirm
   if (next !== "task" && session.phase === "running") stop(pauseReason(next));
   shown = next;
   const stopped = session.phase === "running" ? "paused" : session.phase;

@@ -280,6 +280,15 @@ describe("the clock never runs behind a dialog", () => {
     expect([title(), socket().all("run").length]).toEqual([null, 2]);
   });
 
+  test("P after help that was closed at once pauses, although the server has not answered yet", async () => {
+    await running();
+    part("help-button").click();
+    part("help-close").click();
+    key("KeyP");
+    stopped("asked");
+    expect([title(), socket().all("run").length]).toEqual(["Paused", 1]);
+  });
+
   test("a lost picture stops it for as long as it takes to return", async () => {
     await running({ draw: "browser" });
     world.onLost();

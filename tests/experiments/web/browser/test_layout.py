@@ -53,4 +53,4 @@ def test_the_page_of_a_task_in_windows_of_all_shapes(tmp_path, chromium):
         assert struck == ["none", "line-through", "none"], "only what was delivered is struck through"
         page.set_viewport_size({"width": 1280, "height": 720})
         page.get_by_role("button", name="Full screen").click()
-        page.wait_for_function("document.fullscreenElement !== null")
+        page.locator("#play:fullscreen, :fullscreen #play").wait_for()
