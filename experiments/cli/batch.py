@@ -26,8 +26,8 @@ ASSISTANCE = ("none", "highlight", "optimal")
 
 DESCRIPTION = """\
 Run the trials of a design file, or one trial for every combination of --objects, --assistance, --user and --seeds, with
-one process per core and without video. Each trial becomes a run directory under OUT/trials. OUT/trials.parquet and
-OUT/trials.csv have one row per trial.
+one process per core and without video. Each trial becomes a run directory under DIR/trials. DIR/trials.parquet and
+DIR/trials.csv have one row per trial.
 
 Finished trials are not run again: repeat the command to continue after an interruption, or add values to extend the
 design. The records do not depend on --workers. --packed stores the trials in a few SQLite archives, which the other
@@ -53,7 +53,8 @@ def add_parser(commands: Any) -> None:
         metavar="A:B",
         help="seeds, such as 1,2,5 or 0:10, which excludes 10 (default: 0:10)",
     )
-    add_setting(parser, "user", type=text_list, metavar="NAME,..")
+    users = f"participants{NAMES['user']()} (default: {DEFAULT_PARTICIPANT})"
+    add_setting(parser, "user", type=text_list, metavar="NAME,..", help=users)
     add_trial_options(parser)
     add_workers(parser)
     add_shards(parser)

@@ -33,13 +33,13 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
         "--executor",
         choices=EXECUTORS,
         default=PROCESSES,
-        help="run in processes on this machine, or on the Ray cluster at RAY_ADDRESS, whose machines share OUT "
+        help="run in processes on this machine, or on the Ray cluster at RAY_ADDRESS, whose machines share DIR "
         "(default: %(default)s)",
     )
     parser.add_argument(
         "--packed",
         action="store_true",
-        help="store the trials in OUT/trials/*.sqlar, a file per worker, instead of a folder per trial; for batches of "
+        help="store the trials in DIR/trials/*.sqlar, a file per worker, instead of a folder per trial; for batches of "
         "many thousands (`mjsim unpack --help`)",
     )
 
@@ -103,7 +103,7 @@ def add_shards(parser: argparse.ArgumentParser) -> None:
         "--shard",
         type=_shard,
         metavar="K/N",
-        help="run only share K of N equal shares (from 1), and write no tables; all shards may use the same OUT "
+        help="run only share K of N equal shares (from 1), and write no tables; all shards may use the same DIR "
         "(docs/batches.md)",
     )
     modes.add_argument(
@@ -111,7 +111,7 @@ def add_shards(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         type=Path,
         metavar="PART",
-        help="run nothing: merge the folders of shards into OUT (without PART, OUT has all shards already), write the "
+        help="run nothing: merge the folders of shards into DIR (without PART, DIR has all shards already), write the "
         "tables, and list incomplete shards",
     )
 

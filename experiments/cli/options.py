@@ -14,7 +14,7 @@ from experiments.participants.distribution import Distributions
 from experiments.participants.registry import participant_names
 from experiments.session.film_config import FilmConfig
 from experiments.trials.design import numbers
-from experiments.trials.trial_config import DEFAULTS, SETTINGS, TrialConfig, episode_settings
+from experiments.trials.trial_config import DEFAULTS, SEEDS, SETTINGS, TrialConfig, episode_settings
 from hud.conditions import CONDITIONS, OPTIONS
 from mjsim.render.profiles import FAST, MAX_SIDE, PROFILES
 from mjsim.values.person_parameters import RANGES, PersonParameters
@@ -81,7 +81,10 @@ class HelpFormatter(argparse.RawDescriptionHelpFormatter, argparse.ArgumentDefau
         has_default = (
             action.option_strings and action.nargs != 0 and default not in (None, (), [], {}) and not said
         )
-        return super()._get_help_string(action) if has_default else action.help
+        if not has_default:
+            return action.help
+        value = f"{default:g}" if isinstance(default, float) else "%(default)s"
+        return f"{action.help} (default: {value})"
 
 
 def add_command(
@@ -110,7 +113,7 @@ def add_call_limit(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         action=_CallLimit,
         metavar="S",
-        help="time limit for one call of a custom participant, condition or planner, s; a trial that exceeds the limit "
+        help="time limit for one call of a custom participant, condition or planner, in seconds; a trial that exceeds it "
         f"ends with an error (default: {CALL_LIMIT}, else no limit)",
     )
 
@@ -126,6 +129,8 @@ def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> N
     """Add an option for a setting of `TrialConfig`. It defaults to None unless `changes` has a default."""
     extra, option = dict(SETTINGS[name].extra or {}), f"--{name.replace('_', '-')}"
     text = f"{str(SETTINGS[name].description).replace('`', '').rstrip('.')}{NAMES.get(name, str)()}"
+    if name in SEEDS:
+        text += " (default: the value of --seed)"
     named = isinstance(DEFAULTS[name], str | int) and _TYPES[name] is not bool and "(default" not in text
     if named and "default" not in changes:
         text += f" (default: {DEFAULTS[name]})"
@@ -141,11 +146,11 @@ def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> N
 NAMES: dict[str, Callable[[], str]] = {  # functions that list the possible values of a setting in the help
     "user": lambda: (
         f": {', '.join(participant_names())}, or package.module:attribute; follower uses the guidance shown, in any "
-        "condition; boltzmann:T chooses a visit that costs r metres more with odds exp(-r/T)"
+        "condition; boltzmann:T chooses a visit that costs r metres more with odds proportional to exp(-r/T)"
     ),
     "assistance": lambda: (
-        f": {', '.join(CONDITIONS)}, or package.module:attribute; "
-        f"{', '.join(f'-{name}' for name in OPTIONS)} may follow"
+        f": {', '.join(CONDITIONS)}, or package.module:attribute. Options are appended to the name, as in "
+        f"optimal-minimap-pin: {', '.join(OPTIONS)} (docs/hud.md)"
     ),
     "training_assistance": lambda: ": as --assistance",
     "planner": lambda: f": {', '.join(SOLVERS)}, or package.module:attribute",
@@ -217,7 +222,7 @@ def add_frame(
     """Add the options `--size` and `--profile`. The text `otherwise` is appended to the help of `--size`."""
     default = f"{size[0]}x{size[1]}" if size else None
     parser.add_argument(
-        "--size", type=frame_size, default=default, metavar="WxH", help=f"frame size, px{otherwise}"
+        "--size", type=frame_size, default=default, metavar="WxH", help=f"frame size in pixels{otherwise}"
     )
     parser.add_argument(
         "--profile", default=profile, metavar="NAME", help=f"render profile: {', '.join(PROFILES)}"

@@ -66,7 +66,7 @@ def add_parser(commands: Any) -> None:
         "--time-limit",
         type=float,
         metavar="S",
-        help="time limit, s, accurate to half a second (default: none, but a limit on the planner's work)",
+        help="time limit in seconds, accurate to half a second (default: none, but a limit on the planner's work)",
     )
     claim = parser.add_mutually_exclusive_group()
     claim.add_argument(

@@ -93,7 +93,7 @@ def add_parser(commands: Any) -> None:
         type=_minimum,
         default={},
         metavar="PHASE=S,..",
-        help="minimum durations of story, flythrough and training, s (docs/browser.md)",
+        help="minimum durations of story, flythrough and training, in seconds (docs/browser.md)",
     )
     group.add_argument(
         "--questions",

@@ -54,13 +54,13 @@ def add_parser(commands: Any) -> None:
         "--eye",
         type=point,
         metavar="X,Y,Z",
-        help="position of a free camera, m (default: circles the house)",
+        help="position of a free camera, in metres (default: circles the house)",
     )
     parser.add_argument(
         "--target",
         type=point,
         metavar="X,Y,Z",
-        help="target of a free camera, m (default: the middle of the floor)",
+        help="target of a free camera, in metres (default: the middle of the floor)",
     )
     parser.add_argument(
         "--assistance",

@@ -9,18 +9,18 @@ from experiments.cli.options import add_command
 from experiments.errors import RecordError
 
 DESCRIPTION = """\
-Turn packed trials of a batch (`mjsim batch --packed`) into run directories under OUT/trials, with the same bytes as a
+Turn packed trials of a batch (`mjsim batch --packed`) into run directories under DIR/trials, with the same bytes as a
 batch without --packed writes. Each file is verified by its SHA-256, and a packed trial is deleted only after its run
 directory is on disk. Repeat the command to continue after an interruption.
 
 You rarely need this: `mjsim replay`, `view`, `metrics`, `compare` and `study analyze` read packed trials, and a batch
-may contain both kinds. Without mjsim, `sqlite3 OUT/trials/FILE.sqlar -A --list` lists the files of an archive, and the
+may contain both kinds. Without mjsim, `sqlite3 DIR/trials/FILE.sqlar -A --list` lists the files of an archive, and the
 option `-A --extract` unpacks them."""
 
 
 def add_parser(commands: Any) -> None:
     parser = add_command(commands, "unpack", run, description=DESCRIPTION)
-    parser.add_argument("out", type=Path, metavar="OUT", help="folder of a batch")
+    parser.add_argument("out", type=Path, metavar="DIR", help="folder of a batch")
     parser.add_argument("names", nargs="*", metavar="NAME", help="names of trials (default: all)")
 
 

@@ -59,7 +59,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     time_limit: Annotated[
         float | None,
         _about(
-            "Simulated time after which the trial ends, s (default: 60, plus 150 per object).", metavar="S"
+            "Simulated time after which the trial ends, in seconds (default: 60, plus 150 per object).", metavar="S"
         ),
     ] = None
     live: Annotated[
@@ -93,8 +93,8 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     points: Annotated[
         int,
         _about(
-            "Number of points at which objects may lie, at least 1 m apart. Levels of difficulty share them (PAPER "
-            "section 4). Small houses have room for fewer.",
+            "Number of candidate places for objects, at least 1 m apart, that are shared by all levels of difficulty "
+            "(PAPER section 4). Small houses have room for fewer.",
             metavar="N",
         ),
     ] = POINTS
@@ -106,7 +106,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         ),
     ] = 1
     capacity: Annotated[
-        int, _about("Most objects carried at a time; 1 uses only the right hand.", choices=CAPACITIES)
+        int, _about("Largest number of objects carried at a time; with 1, only the right hand is used.", choices=CAPACITIES)
     ] = CAPACITY
     episode: Annotated[
         str | None,
@@ -127,7 +127,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     story: Annotated[
         str | None,
         _about(
-            "Path of a text for the phase `story`, in place of the default text.",
+            "Path of a text file to show in the phase `story` instead of the default text.",
             metavar="FILE",
             path=True,
         ),
@@ -149,7 +149,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     field_of_view_range: Annotated[
         str | None,
         _about(
-            "Range, rad, in which a person may choose the horizontal field of view if the browser draws; without it, "
+            "Range in radians in which a person may choose the horizontal field of view if the browser draws; without it, "
             "the field of view is the person's parameter (docs/browser.md).",
             metavar="LOW,HIGH",
         ),

@@ -8,24 +8,25 @@ from experiments.cli.doctor import require_extra
 from experiments.cli.options import add_command, add_force
 
 DESCRIPTION = """\
-Fit free parameters of the guest (studies/calibration.toml) to the published rows at 6 objects. No row
-over several numbers of objects is looked at. DIR is a pool of people whose parameters are drawn widely:
+Fit the free parameters of the participant model `guest` (studies/calibration.toml) to the published results at 6
+objects. Results over several numbers of objects are not used. DIR is a pool of simulated people whose parameters vary
+widely:
 
   mjsim study simulate pool --people 900 --out runs/pool     # resumes after an interruption
   mjsim study calibrate runs/pool
 
-A surrogate of trials is learnt from the pool; populations are drawn from the priors, and those are kept whose studies
-are nearest to the published one (approximate Bayesian computation). Writes
+The method is approximate Bayesian computation. The pool trains a surrogate that predicts trials. Populations are drawn
+from the priors, and those whose predicted studies are closest to the published one are kept. Files:
 
-  calibration.html    which parameters are identifiable, which trade off, how good the surrogate is
-  calibration.json    the same
-  kept.csv            the parameters that are kept
-  study.toml          the study with the best population, for `mjsim study simulate` to confirm
+  calibration.html    report: identifiable parameters, correlations between parameters, accuracy of the surrogate
+  calibration.json    the same numbers
+  kept.csv            parameters of the populations that were kept
+  study.toml          study with the best population, to confirm the fit with `mjsim study simulate`
 
-Where a study with that population does not come out as the surrogate has it, calibrate again with the folder of that
-study named as well: its people at 6 objects are learnt from, too, and nothing else of it is looked at.
+If that study differs from the surrogate's prediction, calibrate again and name its folder as well: its people at 6
+objects are then added to the training data.
 
-What fits is not therefore true; docs/paper.md says what may be concluded."""
+A good fit does not mean that the model is true. docs/paper.md explains what can be concluded."""
 
 
 def add_parser(commands: Any) -> None:
@@ -41,13 +42,13 @@ def add_parser(commands: Any) -> None:
         "folders", type=Path, nargs="+", metavar="DIR", help="folder of a pool; results go to the first"
     )
     parser.add_argument(
-        "--study", default="paper", metavar="STUDY.toml", help="study to write for (default: %(default)s)"
+        "--study", default="paper", metavar="STUDY.toml", help="study whose population is fitted (default: %(default)s)"
     )
     parser.add_argument(
-        "--draws", type=int, default=10_000, metavar="N", help="populations (default: %(default)s)"
+        "--draws", type=int, default=10_000, metavar="N", help="number of populations to draw (default: %(default)s)"
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of all chance")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: DIR/calibration)")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the random draws")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: DIR/calibration)")
     add_force(parser, "replace an earlier calibration")
 
 

@@ -9,9 +9,9 @@ from experiments.cli.options import add_command
 from experiments.cli.study.simulate import add_study
 
 DESCRIPTION = """\
-Simulate the negative controls of a study (studies/controls.toml): the same people with another
-participant, or without one of the parts of their model. Each is a study in a folder of its own under OUT. A control
-that agrees with the published rows that should depend on what it lacks shows that these rows say nothing about it."""
+Simulate the negative controls of a study (studies/controls.toml). In each control, the same people use another
+participant model, or their model lacks one part. Each control is a study with its own folder under DIR. If a control
+still agrees with a published result, that result is not evidence for the missing part."""
 
 
 def add_parser(commands: Any) -> None:
@@ -20,7 +20,7 @@ def add_parser(commands: Any) -> None:
         commands, "controls", run, summary="simulate a study's negative controls", description=DESCRIPTION
     )
     add_study(parser, nargs="?", default="paper")
-    parser.add_argument("--only", metavar="NAME", help="only this control (default: all)")
+    parser.add_argument("--only", metavar="NAME", help="simulate only this control (default: all)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the controls")
 
 

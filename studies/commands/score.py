@@ -11,13 +11,13 @@ from experiments.cli.options import add_command, add_force
 WIDTH = 160  # width of the table in characters if the output is not a terminal
 
 DESCRIPTION = """\
-Score a study against the published one (studies/published.toml): effect sizes within the 90 %
-prediction intervals of the published ones, decisions of tests, directions, orders of variances, beside what the truth
-would score. Rows at 6 objects may be fitted; rows over all numbers of objects are not. Answers to survey questions are
-never simulated.
+Compare the results of a study with those of the published one (studies/published.toml): effect sizes, which should be
+within the 90 % prediction intervals of the published ones, test decisions, directions of effects, and orders of
+variances. For comparison, the score of a model that is true is shown, too. Only rows at 6 objects can have been used to
+fit the guest (`mjsim study calibrate`). Answers to survey questions are not simulated.
 
-With 200 people or more in every cell, the people are a pool: effect sizes are those of the population, and 200 studies
-of the published size are drawn from it, to see how many come out as published."""
+If every cell has at least 200 people, they are treated as a population: effect sizes are those of the population, and
+200 studies of the published size are drawn from it, to count how many have the published result."""
 
 
 def add_parser(commands: Any) -> None:
@@ -26,8 +26,8 @@ def add_parser(commands: Any) -> None:
         commands, "score", run, summary="compare a study with the published one", description=DESCRIPTION
     )
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a study or a batch")
-    parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the studies that are drawn")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: DIR/analysis)")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed for drawing these studies")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: DIR/analysis)")
     add_force(parser, "replace an earlier score")
 
 

@@ -12,7 +12,7 @@ from experiments.trials.design import counted
 DESCRIPTION = """\
 Simulate the participants of a study on all cores. The study file is a design of `mjsim batch` (docs/batches.md) with a
 participant model and its parameters; `paper` is the published study with 447 participants. Each participant has a run
-directory under OUT/trials and a row in OUT/trials.parquet and OUT/trials.csv. Repeat the command to continue after an
+directory under DIR/trials and a row in DIR/trials.parquet and DIR/trials.csv. Repeat the command to continue after an
 interruption: no participant is lost or duplicated. The results do not depend on --workers. All data are simulated: they
 are not evidence about people."""
 
