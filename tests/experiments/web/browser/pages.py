@@ -4,6 +4,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import time
 from contextlib import contextmanager
@@ -88,6 +89,12 @@ class Chromium(Page):
     def click(self, selector):
         self.shown.locator(selector).first.click()
 
+    def stop(self, seconds):
+        """Stop all processes of the browser for some time."""
+        session = self._page.context.browser.new_browser_cdp_session()
+        processes = [each["id"] for each in session.send("SystemInfo.getProcessInfo")["processInfo"]]
+        _stop([lambda signal, process=process: os.kill(process, signal) for process in processes], seconds)
+
     def resize(self, width, height):
         self._page.set_viewport_size({"width": width, "height": height})
 
@@ -102,9 +109,9 @@ class Chromium(Page):
 class Firefox(Page):
     """One tab of a browser that listens at an address."""
 
-    def __init__(self, socket):
+    def __init__(self, socket, process):
         super().__init__()
-        self._socket, self._count = socket, 0
+        self._socket, self._process, self._count = socket, process, 0
         self._ask("session.new", capabilities={"alwaysMatch": {"acceptInsecureCerts": True}})
         # The first one never has the focus.
         self._tab = self._shown = self._ask("browsingContext.create", type="tab")["context"]
@@ -130,6 +137,10 @@ class Firefox(Page):
             self.wait_for("document.querySelector('iframe')")
             (tab,) = self._ask("browsingContext.getTree", root=self._tab)["contexts"]
             self._shown = tab["children"][0]["context"]
+
+    def stop(self, seconds):
+        """Stop all processes of the browser for some time."""
+        _stop([lambda signal: os.killpg(self._process.pid, signal)], seconds)
 
     def click(self, selector):
         middle = MIDDLE.format(selector=json.dumps(selector))
@@ -176,6 +187,17 @@ class Firefox(Page):
             self.faults.append(params["text"])
 
 
+def _stop(send, seconds):
+    """Send SIGSTOP to processes and SIGCONT after some time; `send` has a function per process or group."""
+    for each in send:
+        each(signal.SIGSTOP)
+    try:
+        time.sleep(seconds)
+    finally:
+        for each in send:
+            each(signal.SIGCONT)
+
+
 @contextmanager
 def firefox(profile, screen=None):
     """A Firefox on a screen, or else without one; `profile` is a new folder."""
@@ -186,7 +208,9 @@ def firefox(profile, screen=None):
     variables = {**os.environ, **({} if screen is None else {"DISPLAY": screen})}
     with (
         log.open("wb") as output,
-        subprocess.Popen([str(FIREFOX), *words], stdout=output, stderr=output, env=variables) as process,
+        subprocess.Popen(
+            [str(FIREFOX), *words], stdout=output, stderr=output, env=variables, start_new_session=True
+        ) as process,
     ):
         try:
             until = time.monotonic() + PATIENCE
@@ -194,7 +218,7 @@ def firefox(profile, screen=None):
                 assert process.poll() is None and time.monotonic() < until, log.read_text()
                 time.sleep(0.1)
             with connect(f"{address[1]}/session", max_size=None) as socket:
-                yield Firefox(socket)
+                yield Firefox(socket, process)
         finally:  # a failed test must not wait for its browser
             process.kill()
 

@@ -18,6 +18,7 @@ TITLE = "(document.getElementById('panel').open ? document.getElementById('panel
 PLAYING = (
     "document.getElementById('play')?.dataset.phase === 'running' && !document.getElementById('panel').open"
 )
+CLOCK = "document.getElementById('clock').textContent.split(':').reduce((sum, part) => 60 * sum + Number(part), 0)"
 FRAME = "document.getElementById('screen').toDataURL()"
 LOSS = (
     "window.loss = document.getElementById('world').getContext('webgl2').getExtension('WEBGL_lose_context')"
@@ -107,6 +108,19 @@ def test_a_mute_connection_is_replaced_and_a_held_key_still_walks(tmp_path, requ
             before = page.evaluate(FRAME)
             page.wait_for(f"{FRAME} !== {json.dumps(before)}")  # the view still turns
         page.up("ArrowLeft")
+
+
+@pytest.mark.parametrize(("browser", "draw"), [("chromium", "auto"), ("firefox", "server")])
+def test_a_browser_that_stops_for_30_s_continues_by_itself(tmp_path, request, browser, draw):
+    page = request.getfixturevalue(f"{browser}_page")
+    with task(tmp_path, draw) as (server, _):
+        begin(page, server.url)
+        page.wait_for(f"{CLOCK} > 1")
+        before = page.evaluate(CLOCK)
+        page.stop(30.0)
+        page.wait_for(PLAYING)
+        page.wait_for(f"{CLOCK} > {before}")
+        assert page.evaluate(CLOCK) < before + 20.0, "the clock ran while the browser was stopped"
 
 
 def test_a_page_that_was_taken_over_says_so_and_takes_back(tmp_path, chromium):
