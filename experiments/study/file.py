@@ -20,7 +20,7 @@ from experiments.trials.design import read_design
 from experiments.trials.exclusions import Exclusions
 from experiments.trials.trial_config import SEEDS, TrialConfig
 from experiments.visit.plan import COMPLETION, CONSENT, PHASES, PLAYED, Count, Device, Limits, Seconds
-from experiments.visit.texts import Texts, read_texts, story_file
+from experiments.visit.texts import WORDINGS, Texts, read_texts, story_file
 from mjsim.support.files import read_bytes
 
 TEMPLATE = Path(__file__).with_name("template.toml")
@@ -79,6 +79,7 @@ class StudySettings(_Table, frozen=True):
     minutes: Count = 25
     language: Annotated[str, msgspec.Meta(pattern="^[a-zA-Z]{2,3}(-[a-zA-Z0-9]{2,8})*$")] = "en"
     texts: str | None = None
+    consent_version: str = "1"  # version of the consent text, which is stored with each agreement
     phases: tuple[str, ...] = PHASES
     assignment: Literal["balanced", "uniform"] = "balanced"
     minimum: dict[str, Seconds] = {}
@@ -160,7 +161,7 @@ def read_people_study(path: Path) -> Study:
     except msgspec.ValidationError as error:
         raise ConfigError(at_line(path, content.decode(), str(error))) from error
     own_texts = path.parent / settings.texts if settings.texts else None
-    texts = read_texts(settings.language, own_texts, _values(settings))
+    texts = read_texts(settings.language, own_texts, _values(settings), _wordings(settings))
     own = design.trials[0].story
     usual = None if own or STORY not in settings.phases else story_file(settings.language)
     trials = [_of_a_person(trial, settings.phases, usual) for trial in design.trials]
@@ -204,14 +205,26 @@ def _without_seeds(trial: TrialConfig) -> str:
 
 def _values(settings: StudySettings) -> Mapping[str, str]:
     pay = settings.pay
-    paid = {"pay": f"{Decimal(str(pay.reward)):.2f} {pay.currency}"} if pay.reward else {}
+    amounts = {"pay": pay.reward, "screen_out": pay.screen_out}
+    paid = {name: f"{Decimal(str(n)):.2f} {pay.currency}" for name, n in amounts.items() if n}
+    kept = {} if settings.limits.keep_days is None else {"keep_days": str(settings.limits.keep_days)}
     return {
         "title": settings.title,
         "institution": settings.institution,
         "contact": settings.contact,
         "minutes": str(settings.minutes),
         **paid,
+        **kept,
     }
+
+
+def _wordings(settings: StudySettings) -> Mapping[str, tuple[str, str]]:
+    changed = {}
+    if settings.limits.keep_days is not None:
+        changed["retention"] = (CONSENT, "kept_days")
+    if settings.pay.partial:
+        changed["stopping"] = (CONSENT, "stop_partial")
+    return {**WORDINGS, **changed}
 
 
 _PATH = re.compile(r"`\$\.?([\w.\[\]-]*)`")

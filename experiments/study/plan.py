@@ -55,4 +55,5 @@ def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None =
         platform,
         film,
         rehearsal=study.rehearsal,
+        consent_version=settings.consent_version,
     )

@@ -12,6 +12,13 @@ from experiments.visit.texts.items import Item
 from mjsim.support.files import read_bytes
 
 FOLDER = Path(__file__).parents[2] / "texts"
+# Placeholders whose value is one of several texts, with the section and the name of the default text
+WORDINGS = {
+    "pay": ("common", "no_payment"),
+    "screen_out": ("common", "no_payment"),
+    "retention": ("consent", "kept"),
+    "stopping": ("consent", "stop_unpaid"),
+}
 _PLACE = re.compile(r"\{(\w+)\}")
 
 
@@ -46,13 +53,19 @@ def languages() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 
-def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> Texts:
+def read_texts(
+    language: str,
+    path: Path | None,
+    values: Mapping[str, str],
+    wordings: Mapping[str, tuple[str, str]] = WORDINGS,
+) -> Texts:
     """Read the texts of a language. A study's own file may replace some of them.
 
     Args:
         language: Language tag. If the project has no file for the language, `path` must contain all texts.
         path: The study's own file, or None. The items of a section replace all its default items.
         values: Values of placeholders such as `{name}`, by name.
+        wordings: Section and name of the text that fills a placeholder without a value, by placeholder.
 
     Raises:
         ConfigError: A file cannot be read, or has an unknown section, text or placeholder.
@@ -76,7 +89,12 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
                 f"{path}: no text {unknown[0]!r} in [{name}]; there are {', '.join(usual[name])}"
             )
     tables = {name: {**table, **own.get(name, {})} for name, table in usual.items()}
-    values = {"pay": tables["common"]["no_payment"], **values}
+    chosen = {place: str(tables[section].get(name, "")) for place, (section, name) in wordings.items()}
+    chosen = {
+        place: _PLACE.sub(lambda found: values.get(found[1], found[0]), text)
+        for place, text in chosen.items()
+    }
+    values = {**chosen, **values}
     return {name: _section(name, table, english[name], values, path) for name, table in tables.items()}
 
 
