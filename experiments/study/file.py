@@ -81,6 +81,7 @@ class StudySettings(_Table, frozen=True):
     texts: str | None = None
     consent_version: str = "1"  # version of the consent text, which is stored with each agreement
     phases: tuple[str, ...] = PHASES
+    require_film: bool = False  # if True, participants must play the film to its end
     assignment: Literal["balanced", "uniform"] = "balanced"
     minimum: dict[str, Seconds] = {}
     optional: tuple[str, ...] = ()

@@ -67,6 +67,7 @@ class VisitPlan:
         headset: True if trials can be played with a VR headset.
         floor_plan: True if the run directory of the task includes a floor plan with the participant's path.
         rehearsal: True if all participants are simulated.
+        film_required: True if participants must play the film to its end.
         consent_version: The researcher's version of the consent text.
     """
 
@@ -89,6 +90,7 @@ class VisitPlan:
     headset: bool = False
     floor_plan: bool = False
     rehearsal: bool = False
+    film_required: bool = False
     consent_version: str = "1"
 
     @property
