@@ -20,7 +20,7 @@ from experiments.trials.design import read_design
 from experiments.trials.exclusions import Exclusions
 from experiments.trials.trial_config import SEEDS, TrialConfig
 from experiments.visit.plan import COMPLETION, CONSENT, PHASES, PLAYED, Count, Device, Limits, Seconds
-from experiments.visit.texts import WORDINGS, Texts, read_texts, story_file
+from experiments.visit.texts import Texts, read_texts, story_file
 from mjsim.support.files import read_bytes
 
 TEMPLATE = Path(__file__).with_name("template.toml")
@@ -162,7 +162,7 @@ def read_people_study(path: Path) -> Study:
     except msgspec.ValidationError as error:
         raise ConfigError(at_line(path, content.decode(), str(error))) from error
     own_texts = path.parent / settings.texts if settings.texts else None
-    texts = read_texts(settings.language, own_texts, _values(settings), _wordings(settings))
+    texts = read_texts(settings.language, own_texts, _values(settings))
     own = design.trials[0].story
     usual = None if own or STORY not in settings.phases else story_file(settings.language)
     trials = [_of_a_person(trial, settings.phases, usual) for trial in design.trials]
@@ -208,7 +208,8 @@ def _values(settings: StudySettings) -> Mapping[str, str]:
     pay = settings.pay
     amounts = {"pay": pay.reward, "screen_out": pay.screen_out}
     paid = {name: f"{Decimal(str(n)):.2f} {pay.currency}" for name, n in amounts.items() if n}
-    kept = {} if settings.limits.keep_days is None else {"keep_days": str(settings.limits.keep_days)}
+    days = settings.limits.keep_days
+    kept = {} if days is None else {"keep_days": str(days)}
     return {
         "title": settings.title,
         "institution": settings.institution,
@@ -216,16 +217,8 @@ def _values(settings: StudySettings) -> Mapping[str, str]:
         "minutes": str(settings.minutes),
         **paid,
         **kept,
+        **({"partial": "yes"} if pay.partial else {}),
     }
-
-
-def _wordings(settings: StudySettings) -> Mapping[str, tuple[str, str]]:
-    changed = {}
-    if settings.limits.keep_days is not None:
-        changed["retention"] = (CONSENT, "kept_days")
-    if settings.pay.partial:
-        changed["stopping"] = (CONSENT, "stop_partial")
-    return {**WORDINGS, **changed}
 
 
 _PATH = re.compile(r"`\$\.?([\w.\[\]-]*)`")

@@ -12,13 +12,6 @@ from experiments.visit.texts.items import Item
 from mjsim.support.files import read_bytes
 
 FOLDER = Path(__file__).parents[2] / "texts"
-# Placeholders whose value is one of several texts, with the section and the name of the default text
-WORDINGS = {
-    "pay": ("common", "no_payment"),
-    "screen_out": ("common", "no_payment"),
-    "retention": ("consent", "kept"),
-    "stopping": ("consent", "stop_unpaid"),
-}
 _HEADER = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]")
 _ITEM = re.compile(r"`\$\.item\[(\d+)\](?:\.(\w+))?")
 _PLACE = re.compile(r"\{(\w+)\}")
@@ -55,19 +48,14 @@ def languages() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 
-def read_texts(
-    language: str,
-    path: Path | None,
-    values: Mapping[str, str],
-    wordings: Mapping[str, tuple[str, str]] = WORDINGS,
-) -> Texts:
+def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> Texts:
     """Read the texts of a language. A study's own file may replace some of them.
 
     Args:
         language: Language tag. If the project has no file for the language, `path` must contain all texts.
         path: The study's own file, or None. The items of a section replace all its default items.
-        values: Values of placeholders such as `{name}`, by name.
-        wordings: Section and name of the text that fills a placeholder without a value, by placeholder.
+        values: Values of placeholders such as `{name}`, by name. Values of `keep_days` and `partial` also choose between
+            texts of the consent form.
 
     Raises:
         ConfigError: A file cannot be read, or has an unknown section, text or placeholder.
@@ -90,11 +78,10 @@ def read_texts(
             where = _at(path, name, unknown[0])
             raise ConfigError(f"{where}: no text {unknown[0]!r} in [{name}]; there are {', '.join(usual[name])}")
     tables = {name: {**table, **own.get(name, {})} for name, table in usual.items()}
-    chosen = {place: str(tables[section].get(name, "")) for place, (section, name) in wordings.items()}
-    chosen = {
-        place: _PLACE.sub(lambda found: values.get(found[1], found[0]), text)
-        for place, text in chosen.items()
-    }
+    consent, unpaid, days = tables["consent"], tables["common"]["no_payment"], values.get("keep_days", "")
+    retention = str(consent["kept_days" if days else "kept"]).replace("{keep_days}", days)
+    stopping = consent["stop_partial" if "partial" in values else "stop_unpaid"]
+    chosen = {"pay": unpaid, "screen_out": unpaid, "retention": retention, "stopping": stopping}
     values = {**chosen, **values}
     return {name: _section(name, table, english[name], values, path) for name, table in tables.items()}
 
