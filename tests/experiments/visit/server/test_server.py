@@ -149,6 +149,16 @@ def send_shown(client, link, **answers):
 
 
 @pytest.mark.parametrize("left_out", [(), ("hands",), ("hands", "speed")])
+def test_a_computer_that_does_not_fit_may_be_given_up(client, study):
+    link = begin(client)
+    go_to(client, link, study, "device")
+    assert 'name="give_up"' not in client.get(link).text
+    assert "too slow" in send_shown(client, link, **{**DEVICE, "latency_ms": "9999"})
+    assert 'name="give_up"' in client.get(link).text
+    send_shown(client, link, **{**DEVICE, "latency_ms": "9999", "give_up": "yes"})
+    assert phase(client, link) is None
+
+
 def test_missing_answers_and_repeated_clicks_use_up_no_attempt(client, study, left_out):
     link = begin(client)
     go_to(client, link, study, "comprehension")
