@@ -48,9 +48,14 @@ def add_parser(commands: Any) -> None:
         "--reject", metavar="PERSON", help="reject the submission of a participant, such as p00012"
     )
     parser.add_argument(
-        "--grant", nargs=2, metavar=("PERSON", "AMOUNT"), help="owe a participant an amount that no rule gives"
+        "--grant",
+        nargs=2,
+        metavar=("PERSON", "AMOUNT"),
+        help="owe a participant an amount that no rule gives",
     )
-    parser.add_argument("--reason", metavar="TEXT", help="reason that the participant sees for --reject or --grant")
+    parser.add_argument(
+        "--reason", metavar="TEXT", help="reason that the participant sees for --reject or --grant"
+    )
     parser.add_argument(
         "--rehearsal",
         type=Path,

@@ -107,7 +107,9 @@ async def grant(store: Store, person: PersonRow, amount: Decimal, currency: str,
     given = [event for event in await store.ledger.history(person.id) if event.event == "decided"]
     earlier = [event for event in given if f"-{GRANT}-" in event.key]
     if same := [event.key for event in earlier if (event.cents, event.note) == (cents, why)]:
-        raise StoreError(f"{same[0]} is the same amount for the same reason; give another reason to pay again")
+        raise StoreError(
+            f"{same[0]} is the same amount for the same reason; give another reason to pay again"
+        )
     key = f"{person_name(person)}-{GRANT}-{len(earlier) + 1}"
     await store.ledger.decide(person.id, "bonus", cents, currency, key, why)
     details = {"person": person.id, "key": key, "cents": cents, "currency": currency, "reason": why}

@@ -181,7 +181,10 @@ class Consent(FormPhase):
         read = super().read(visitor, sent)
         if isinstance(read, Again):
             return read
-        text = {"text_version": self._plan.consent_version, "text_sha256": sha256(self.copy.encode()).hexdigest()}
+        text = {
+            "text_version": self._plan.consent_version,
+            "text_sha256": sha256(self.copy.encode()).hexdigest(),
+        }
         return Done({"agreed": True, **text, **read.answers})
 
     @property
@@ -203,7 +206,9 @@ class Comprehension(FormPhase):
     def values(self, visitor: Visitor) -> Mapping[str, Any]:
         """Return additional values for the page's template."""
         limit = self._plan.limits.attempts
-        left = "" if limit is None else self.texts["attempts"].replace("{left}", str(limit - visitor.attempts))
+        left = (
+            "" if limit is None else self.texts["attempts"].replace("{left}", str(limit - visitor.attempts))
+        )
         return {"story": self._plan.story_paragraphs, "attempt": visitor.attempts, "attempts_left": left}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
@@ -213,7 +218,9 @@ class Comprehension(FormPhase):
             return dataclasses.replace(read, counts=False)
         again = Again(self.texts["wrong"], {"form": self._form(None, read.answers)})
         if sent.get("attempt", str(visitor.attempts)) != str(visitor.attempts):
-            return dataclasses.replace(again, counts=False)  # the attempt of this page has already been counted
+            return dataclasses.replace(
+                again, counts=False
+            )  # the attempt of this page has already been counted
         if not any(item.is_wrong(read.answers.get(item.name)) for item in self.items):
             return read
         limit = self._plan.limits.attempts

@@ -54,8 +54,8 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
     Args:
         language: Language tag. If the project has no file for the language, `path` must contain all texts.
         path: The study's own file, or None. The items of a section replace all its default items.
-        values: Values of placeholders such as `{name}`, by name. Values of `keep_days` and `partial` also choose between
-            texts of the consent form.
+        values: Values of placeholders such as `{name}`, by name. `keep_days` and `partial` also choose between texts
+            of the consent form.
 
     Raises:
         ConfigError: A file cannot be read, or has an unknown section, text or placeholder.
@@ -76,7 +76,9 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
             raise ConfigError(f"{_at(path, name)}: no section [{name}]; there are {', '.join(usual)}")
         if unknown := sorted(set(table) - set(usual[name]) - {"item", "scale"}):
             where = _at(path, name, unknown[0])
-            raise ConfigError(f"{where}: no text {unknown[0]!r} in [{name}]; there are {', '.join(usual[name])}")
+            raise ConfigError(
+                f"{where}: no text {unknown[0]!r} in [{name}]; there are {', '.join(usual[name])}"
+            )
     tables = {name: {**table, **own.get(name, {})} for name, table in usual.items()}
     consent, unpaid, days = tables["consent"], tables["common"]["no_payment"], values.get("keep_days", "")
     retention = str(consent["kept_days" if days else "kept"]).replace("{keep_days}", days)

@@ -109,7 +109,11 @@ def test_own_texts_replace_some_and_are_checked(tmp_path):
         ('[story]\ntitle = "x"\nheading = "x"\n', 3, "no text 'heading' in"),
         ('[welcome]\ntitle = "x"\n[story]\ntitle = 3\n', 4, "title is 3; write a text"),
         ('[story]\n[consent]\ntitle = "x"\ntext = """\nA {nobody}"""\n', 4, r"text has a place \{nobody\}"),
-        (f"{ITEM.format('a', 'text')}{ITEM.format('b', 'essay')}", 7, "item 2: kind is 'essay'; Invalid enum"),
+        (
+            f"{ITEM.format('a', 'text')}{ITEM.format('b', 'essay')}",
+            7,
+            "item 2: kind is 'essay'; Invalid enum",
+        ),
         (f"{ITEM.format('a', 'text')}{ITEM.format('a', 'line')}", 6, "two items with the name 'a'"),
         (f"{ITEM.format('a', 'text')}{ITEM.format('b', 'scale')}right = 9\n", 9, "right is 9, no point"),
     ],
@@ -119,8 +123,6 @@ def test_errors_of_ones_own_texts_name_line_and_value(tmp_path, content, line, s
     own.write_text(content)
     with pytest.raises(ConfigError, match=rf"^{re.escape(str(own))}, line {line}: .*{said}"):
         read_texts("en", own, {name: name for name in PLACES})
-
-
 
 
 def shape(texts):

@@ -86,7 +86,12 @@ def test_a_payment_outside_the_rules_is_owed_once_and_audited(tmp_path, capsys):
 
     asyncio.run(ask(fill))
     assert granted(tmp_path, "p00004", "2.50", "--reason", "the server failed") == 0
-    for words in (("2.50", "--reason", "the server failed"), ("0",), ("-1", "--reason", "x"), ("1.234", "--reason", "x")):
+    for words in (
+        ("2.50", "--reason", "the server failed"),
+        ("0",),
+        ("-1", "--reason", "x"),
+        ("1.234", "--reason", "x"),
+    ):
         assert granted(tmp_path, "p00004", *words) == 2
     assert granted(tmp_path, "p00099", "1", "--reason", "x") == 2
     assert "is the same amount for the same reason" in capsys.readouterr().err

@@ -83,7 +83,12 @@ def test_a_good_file_has_no_problems(study):
         ("people@university.edu", "you@example.org", 19, "working address"),
         ("A university", "your institution", 18, "name your institution"),
         ("reward = 2.0", "reward = 2.0\nwage = 15.0", 23, "12.00 an hour, below the wage of 15.00"),
-        ("reward = 2.0", 'reward = 2.0\nscreen_out = 1.0\n[study.recruitment]\nplatform = "prolific"', 25, "completed"),
+        (
+            "reward = 2.0",
+            'reward = 2.0\nscreen_out = 1.0\n[study.recruitment]\nplatform = "prolific"',
+            25,
+            "completed",
+        ),
         ("people = 2", "people = 1", 16, "one person"),
     ],
 )
@@ -107,8 +112,14 @@ def test_people_of_a_platform_are_not_screened_out_without_pay(tmp_path, amount,
 @pytest.mark.parametrize("language", languages())
 def test_the_consent_text_says_who_is_paid_what_and_how_long_data_are_kept(tmp_path, language):
     texts = {}
-    for name, more in (("unpaid", ""), ("paid", "screen_out = 0.5\npartial = true\n[study.limits]\nkeep_days = 90")):
-        changed = (("reward = 2.0", f"reward = 2.0\n{more}"), ("minutes = 10", f'minutes = 10\nlanguage = "{language}"'))
+    for name, more in (
+        ("unpaid", ""),
+        ("paid", "screen_out = 0.5\npartial = true\n[study.limits]\nkeep_days = 90"),
+    ):
+        changed = (
+            ("reward = 2.0", f"reward = 2.0\n{more}"),
+            ("minutes = 10", f'minutes = 10\nlanguage = "{language}"'),
+        )
         study = with_text(tmp_path, one=changed[0], other=changed[1])
         assert problems_of_file(study) == []
         texts[name] = "\n".join(study.texts["consent"].paragraphs())
@@ -119,10 +130,14 @@ def test_the_consent_text_says_who_is_paid_what_and_how_long_data_are_kept(tmp_p
 
 
 def test_a_consent_text_that_lacks_something_is_a_problem(tmp_path):
-    (tmp_path / "texts.toml").write_text('[consent]\ntext = "You may write to {contact}. We delete data after 3 months."\n')
+    (tmp_path / "texts.toml").write_text(
+        '[consent]\ntext = "You may write to {contact}. We delete data after 3 months."\n'
+    )
     changed = with_text(tmp_path, only=("minutes = 10", 'minutes = 10\ntexts = "texts.toml"'))
     (found,) = located(changed, problems_of_file(changed))
-    lacking = "the legal basis, the participant's rights, the pay of a participant who stops early, the controller"
+    lacking = (
+        "the legal basis, the participant's rights, the pay of a participant who stops early, the controller"
+    )
     assert f"line 21: the consent text does not name {lacking};" in found
 
 

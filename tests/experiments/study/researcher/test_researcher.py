@@ -119,7 +119,10 @@ def test_nobody_locks_the_account_of_another_researcher(site):
         elsewhere = site.client(researcher=True, headers={"X-Forwarded-For": f"192.0.2.{number + 1}"})
         assert elsewhere.post("/login", data={"name": "owner", "password": "wrong"}).status_code == 403
     assert site.logged_in("owner").get("/").status_code == 200
-    assert site.client(researcher=True).post("/login", data={"name": "viewer", "password": PASSWORD}).status_code == 303
+    assert (
+        site.client(researcher=True).post("/login", data={"name": "viewer", "password": PASSWORD}).status_code
+        == 303
+    )
     failed = [row.who for row in site.ask(site.store.audit_log()) if row.action == "login failed"]
     assert failed == ["owner", "unknown", *["owner"] * (ATTEMPTS[0] + 1)]
 

@@ -148,7 +148,6 @@ def send_shown(client, link, **answers):
     return client.get(answer.headers["location"]).text
 
 
-@pytest.mark.parametrize("left_out", [(), ("hands",), ("hands", "speed")])
 def test_a_computer_that_does_not_fit_may_be_given_up(client, study):
     link = begin(client)
     go_to(client, link, study, "device")
@@ -159,6 +158,7 @@ def test_a_computer_that_does_not_fit_may_be_given_up(client, study):
     assert phase(client, link) is None
 
 
+@pytest.mark.parametrize("left_out", [(), ("hands",), ("hands", "speed")])
 def test_missing_answers_and_repeated_clicks_use_up_no_attempt(client, study, left_out):
     link = begin(client)
     go_to(client, link, study, "comprehension")
@@ -208,9 +208,9 @@ def test_a_film_that_is_required_is_played(tmp_path, study, sent, follows, kept)
         assert "Press the play button" in client.get(link).text
         text = send_shown(client, link, **{"played_s": "", "film_s": "", "film_error": "", **sent})
         assert phase(client, link) == follows
-        assert ("Please press the play button" in text.replace(study.texts["flythrough"]["required"], "")) is (
-            follows == "flythrough"
-        )
+        assert (
+            "Please press the play button" in text.replace(study.texts["flythrough"]["required"], "")
+        ) is (follows == "flythrough")
     with closing(sqlite3.connect(tmp_path / "study.db")) as database:
         played = dict(database.execute("SELECT item, value FROM answer WHERE phase = 'flythrough' AND final"))
     assert played == kept
