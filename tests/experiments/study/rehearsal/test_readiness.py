@@ -84,9 +84,9 @@ def test_a_good_file_has_no_problems(study):
         ("A university", "your institution", 18, "name your institution"),
         ("reward = 2.0", "reward = 2.0\nwage = 15.0", 23, "12.00 an hour, below the wage of 15.00"),
         (
-            "reward = 2.0",
-            'reward = 2.0\nscreen_out = 1.0\n[study.recruitment]\nplatform = "prolific"',
-            25,
+            "bonus_for_all = 1.0",
+            'screen_out = 1.0\n[study.recruitment]\nplatform = "prolific"',
+            26,
             "completed",
         ),
         ("people = 2", "people = 1", 16, "one person"),
@@ -101,10 +101,10 @@ def test_problems_name_file_and_line(tmp_path, before, after, line, said):
 CODES = 'completed = "A"\nscreened_out = "B"\nno_consent = "C"'
 
 
-@pytest.mark.parametrize(("amount", "line"), [("\nscreen_out = 0.00", 24), ("", 22)])
+@pytest.mark.parametrize(("amount", "line"), [("\nscreen_out = 0.00", 26), ("", 22)])
 def test_people_of_a_platform_are_not_screened_out_without_pay(tmp_path, amount, line):
-    recruitment = f'reward = 2.0{amount}\n[study.recruitment]\nplatform = "prolific"\n{CODES}'
-    changed = with_text(tmp_path, only=("reward = 2.0", recruitment))
+    recruitment = f'bonus_for_all = 1.0{amount}\n[study.recruitment]\nplatform = "prolific"\n{CODES}'
+    changed = with_text(tmp_path, only=("bonus_for_all = 1.0", recruitment))
     (found,) = located(changed, problems_of_file(changed))
     assert f"line {line}: screen_out is 0.00" in found
 
@@ -117,7 +117,7 @@ def test_the_consent_text_says_who_is_paid_what_and_how_long_data_are_kept(tmp_p
         ("paid", "screen_out = 0.5\npartial = true\n[study.limits]\nkeep_days = 90"),
     ):
         changed = (
-            ("reward = 2.0", f"reward = 2.0\n{more}"),
+            ("bonus_for_all = 1.0", f"bonus_for_all = 1.0\n{more}"),
             ("minutes = 10", f'minutes = 10\nlanguage = "{language}"'),
         )
         study = with_text(tmp_path, one=changed[0], other=changed[1])
