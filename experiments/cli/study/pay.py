@@ -95,7 +95,7 @@ async def _run(study: "Study", store: "Store", arguments: argparse.Namespace) ->
         elif arguments.reject and client is not None:
             await _reject(store, study, client, arguments)
         elif arguments.grant:
-            await _grant(store, study, *arguments.grant, arguments.reason)
+            await _grant(store, study, arguments)
         else:
             await _print(store, study, dry=arguments.dry_run)
             if client is not None:
@@ -154,15 +154,16 @@ async def _reject(store: "Store", study: "Study", client: "Payer", arguments: ar
     print(f"{arguments.reject} will be rejected by --send")
 
 
-async def _grant(store: "Store", study: "Study", name: str, amount: str, reason: str) -> None:
+async def _grant(store: "Store", study: "Study", arguments: argparse.Namespace) -> None:
     from experiments.study.data.collect import person_number
     from experiments.study.payments.rules import grant
 
+    name, amount = arguments.grant
     if not AMOUNT.fullmatch(amount) or not Decimal(amount):
         raise ConfigError(f"AMOUNT is {amount!r}; write it as a number above 0 such as 7.50")
     person, currency = await store.person(person_number(name)), study.settings.pay.currency
-    key = await grant(store, person, Decimal(amount), currency, reason)
-    print(f"{key}  {Decimal(amount):.2f} {currency}  {reason}  owed")
+    key = await grant(store, person, Decimal(amount), currency, arguments.reason)
+    print(f"{key}  {Decimal(amount):.2f} {currency}  {arguments.reason}  owed")
 
 
 async def _note(store: "Store", key: str, reference: str) -> None:
