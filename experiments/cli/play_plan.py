@@ -85,7 +85,7 @@ def plan_of_play(
             idle=max(arguments.idle, 1.0),
             abandoned_after=DAY_S,
             timed_out_after=math.inf,
-            attempts=MAX_VISITS,
+            attempts=None,
         ),
         Device(),
         MINUTES,

@@ -79,7 +79,9 @@ class StudySettings(_Table, frozen=True):
     minutes: Count = 25
     language: Annotated[str, msgspec.Meta(pattern="^[a-zA-Z]{2,3}(-[a-zA-Z0-9]{2,8})*$")] = "en"
     texts: str | None = None
+    consent_version: str = "1"  # version of the consent text, which is stored with each agreement
     phases: tuple[str, ...] = PHASES
+    require_film: bool = False  # if True, participants must play the film to its end
     assignment: Literal["balanced", "uniform"] = "balanced"
     minimum: dict[str, Seconds] = {}
     optional: tuple[str, ...] = ()
@@ -204,13 +206,18 @@ def _without_seeds(trial: TrialConfig) -> str:
 
 def _values(settings: StudySettings) -> Mapping[str, str]:
     pay = settings.pay
-    paid = {"pay": f"{Decimal(str(pay.reward)):.2f} {pay.currency}"} if pay.reward else {}
+    amounts = {"pay": pay.reward, "screen_out": pay.screen_out}
+    paid = {name: f"{Decimal(str(n)):.2f} {pay.currency}" for name, n in amounts.items() if n}
+    days = settings.limits.keep_days
+    kept = {} if days is None else {"keep_days": str(days)}
     return {
         "title": settings.title,
         "institution": settings.institution,
         "contact": settings.contact,
         "minutes": str(settings.minutes),
         **paid,
+        **kept,
+        **({"partial": "yes"} if pay.partial else {}),
     }
 
 

@@ -55,4 +55,6 @@ def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None =
         platform,
         film,
         rehearsal=study.rehearsal,
+        film_required=settings.require_film,
+        consent_version=settings.consent_version,
     )

@@ -37,7 +37,7 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     idle: Seconds = 1800.0  # period of inactivity after which a trial's slot is released, in seconds
     abandoned_after: Seconds = 1800.0  # period of inactivity after which a place is released, in seconds
     timed_out_after: Seconds = 14400.0  # period of inactivity after which a participant times out, in seconds
-    attempts: Count = 3  # maximum number of attempts at the comprehension check
+    attempts: Count | None = 3  # maximum number of attempts at the comprehension check, or None for no limit
     # Number of attention checks in the survey that a participant may fail, or None for no limit
     inattentive: Annotated[int, msgspec.Meta(ge=0, le=1000)] | None = None
     keep_days: Count | None = None  # days of inactivity after which identifying data are deleted
@@ -67,6 +67,8 @@ class VisitPlan:
         headset: True if trials can be played with a VR headset.
         floor_plan: True if the run directory of the task includes a floor plan with the participant's path.
         rehearsal: True if all participants are simulated.
+        film_required: True if participants must play the film to its end.
+        consent_version: The researcher's version of the consent text.
     """
 
     name: str
@@ -88,6 +90,8 @@ class VisitPlan:
     headset: bool = False
     floor_plan: bool = False
     rehearsal: bool = False
+    film_required: bool = False
+    consent_version: str = "1"
 
     @property
     def story_paragraphs(self) -> list[str]:

@@ -17,7 +17,7 @@ from experiments.record.phases import FLYTHROUGH, STORY, TASK
 from experiments.visit.folders import Ended, VisitFolder, VisitFolders
 from experiments.visit.phases import phases_of
 from experiments.visit.phases.base import Again, Answers, Done, FormData, Phase, TrialPhase, Visitor
-from experiments.visit.plan import PHASES, PLAYED, RESULT, VisitPlan
+from experiments.visit.plan import DEBRIEFING, PHASES, PLAYED, RESULT, VisitPlan
 from experiments.visit.recruiter import AFTER
 from experiments.visit.store import Assignment, PersonRow, Status, Store
 from experiments.visit.store.values import utc_now
@@ -55,6 +55,7 @@ class Procedure:
         self.phases = phases_of(plan)
         self.names = [phase.name for phase in self.phases]
         self._rng = rng
+        self._refusals: dict[int, tuple[str, Again]] = {}  # last refusal and its phase, by participant
 
     async def now(self, person: PersonRow, path: str) -> PhaseState:
         """Return the current state of a visit. Record the time if the phase is shown for the first time."""
@@ -77,30 +78,35 @@ class Procedure:
         # If `passed` is negative, the clock has been set back. The participant may then continue immediately.
         return passed, max(0.0, minimum - passed) if passed >= 0.0 or minimum == float("inf") else 0.0
 
-    async def submit(self, now: PhaseState, phase: str, sent: FormData) -> Again | None:
-        """Handle a submitted form.
-
-        Return None if the form was accepted or belongs to an earlier page.
-        """
+    async def submit(self, now: PhaseState, phase: str, sent: FormData) -> None:
+        """Handle a submitted form. Ignore a form of an earlier page."""
         current = now.phase
         if current is None or phase != current.name or isinstance(current, TrialPhase):
-            return None
+            return
         if phase == self.names[-1]:
-            return None
+            return
         skipped = bool(sent.get("skip")) and phase in self.plan.optional
         if now.wait > 0.0 and not skipped:
-            return Again(self.plan.texts["common"]["too_early"])
+            self._refusals[now.person.id] = phase, Again(self.plan.texts["common"]["too_early"])
+            return
         read = Done({"skipped": True}) if skipped else current.read(now.visitor, sent)
         attempts = {ATTEMPTS: now.visitor.attempts + 1}
         if isinstance(read, Again):
-            await self.store.save_answers(now.person.id, phase, attempts)
-            return read
+            await self.save(now, phase, sent)
+            if read.counts:
+                await self.store.save_answers(now.person.id, phase, attempts)
+            self._refusals[now.person.id] = phase, read
+            return
         answers = {**read.answers, **(attempts if now.visitor.attempts else {})}
         if read.outcome == "next":
             await self._move_on(now.person, phase, answers)
         else:
             await self.store.finish_phase(now.person.id, phase, phase, answers, status=read.outcome)
-        return None
+
+    def refusal(self, now: PhaseState) -> Again | None:
+        """Return why the participant's last form was refused. Each refusal is returned only once."""
+        phase, refused = self._refusals.pop(now.person.id, ("", None))
+        return refused if now.phase is not None and phase == now.phase.name else None
 
     async def save(self, now: PhaseState, phase: str, sent: FormData) -> None:
         """Save the answers from a form that the participant is still filling in."""
@@ -156,12 +162,15 @@ class Procedure:
     async def recover(self, before: datetime.datetime | None = None) -> None:
         """Add completed trials that are missing from the database.
 
-        Only check participants who have been inactive since `before`, if given. Log and skip damaged folders.
+        Only check participants who have been inactive since `before`, if given. Those who have closed the debriefing
+        page have done everything, so they finish. Log and skip damaged folders.
         """
         for person in await self.store.people():
             if before is None or person.seen < before:
                 try:
-                    await self.record_trials(person)
+                    person = await self.record_trials(person)
+                    if before and person.active and [person.phase] == self.names[-2:-1] == [DEBRIEFING]:
+                        await self._move_on(person, DEBRIEFING, {}, "timed out")
                 except (RecordError, OSError, msgspec.DecodeError) as error:
                     LOG.error("person %d: %s", person.id, error)
 

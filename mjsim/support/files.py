@@ -91,7 +91,8 @@ def replacing(path: Path) -> Iterator[Path]:
     """Replace a file atomically. Yield a temporary path, which is renamed to `path` on success.
 
     If an exception is raised, the temporary file is removed. It has the same suffix as `path`, because image
-    and video encoders derive the format from the suffix. Symbolic links are followed.
+    and video encoders derive the format from the suffix. Symbolic links are followed. Other users may read the file
+    unless they could not read the folder or the file that is replaced.
     """
     path = Path(os.path.realpath(path))
     if path.exists() and not path.is_file():
@@ -103,7 +104,7 @@ def replacing(path: Path) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
-        temporary.chmod(0o644)
+        temporary.chmod(0o600 if _is_private(path) or _is_private(path.parent) else 0o644)
         temporary.replace(path)
     except OSError as error:
         if error.errno is not None and error.filename is None:  # for example because the disk is full
@@ -111,6 +112,10 @@ def replacing(path: Path) -> Iterator[Path]:
         raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _is_private(path: Path) -> bool:
+    return path.exists() and not path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO)
 
 
 @contextmanager

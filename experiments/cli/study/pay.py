@@ -1,7 +1,9 @@
 """`mjsim study pay`: determine the payments that are owed to participants, and make them."""
 
 import argparse
+import re
 from datetime import timedelta
+from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from experiments.study.payments.platform import Payer
     from experiments.visit.store import Store
 
+AMOUNT = re.compile(r"\d{1,4}(\.\d{1,2})?", re.ASCII)
 DESCRIPTION = """\
 Print the payments that follow from the rules of [study.pay], with the reason and whether each was made. Printed
 payments are recorded in the ledger, so that later changes of the rules do not affect them. --dry-run records nothing.
@@ -26,7 +29,10 @@ If you pay manually, record each payment with --paid KEY --reference TEXT. Recor
 --send and --paid require a rehearsal of the study file that passed (`mjsim study rehearse`): name it once with
 --rehearsal OUT.
 
---reject PERSON --reason TEXT, before the payment is decided, makes the platform reject a submission."""
+--reject PERSON --reason TEXT, before the payment is decided, makes the platform reject a submission.
+
+--grant PERSON AMOUNT --reason TEXT records a payment that no rule gives, for example for a participant whom a fault of
+the study stopped. The audit log records the amount and the reason. --send pays it as a bonus."""
 
 
 def add_parser(commands: Any) -> None:
@@ -41,7 +47,15 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--reject", metavar="PERSON", help="reject the submission of a participant, such as p00012"
     )
-    parser.add_argument("--reason", metavar="TEXT", help="reason that the participant sees for --reject")
+    parser.add_argument(
+        "--grant",
+        nargs=2,
+        metavar=("PERSON", "AMOUNT"),
+        help="owe a participant an amount that no rule gives",
+    )
+    parser.add_argument(
+        "--reason", metavar="TEXT", help="reason that the participant sees for --reject or --grant"
+    )
     parser.add_argument(
         "--rehearsal",
         type=Path,
@@ -57,9 +71,9 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     if bool(arguments.paid) != bool(arguments.reference):
         raise ConfigError("--paid and --reference belong together: name the payment and its receipt")
-    if bool(arguments.reject) != bool(arguments.reason):
-        raise ConfigError("--reject and --reason belong together: name the participant and the reason")
-    wanted = [name for name in ("dry_run", "send", "paid", "reject") if getattr(arguments, name)]
+    if bool(arguments.reject or arguments.grant) != bool(arguments.reason):
+        raise ConfigError("--reason belongs to --reject or --grant: name the participant and the reason")
+    wanted = [name for name in ("dry_run", "send", "paid", "reject", "grant") if getattr(arguments, name)]
     if len(wanted) > 1:
         first, second = (name.replace("_", "-") for name in wanted[:2])
         raise ConfigError(f"--{first} and --{second} cannot be combined; leave one of them out")
@@ -80,6 +94,8 @@ async def _run(study: "Study", store: "Store", arguments: argparse.Namespace) ->
             await _note(store, arguments.paid, arguments.reference)
         elif arguments.reject and client is not None:
             await _reject(store, study, client, arguments)
+        elif arguments.grant:
+            await _grant(store, study, arguments)
         else:
             await _print(store, study, dry=arguments.dry_run)
             if client is not None:
@@ -136,6 +152,18 @@ async def _reject(store: "Store", study: "Study", client: "Payer", arguments: ar
     person = await store.person(person_number(arguments.reject))
     await reject(store, person, study.settings.pay.currency, arguments.reason)
     print(f"{arguments.reject} will be rejected by --send")
+
+
+async def _grant(store: "Store", study: "Study", arguments: argparse.Namespace) -> None:
+    from experiments.study.data.collect import person_number
+    from experiments.study.payments.rules import grant
+
+    name, amount = arguments.grant
+    if not AMOUNT.fullmatch(amount) or not Decimal(amount):
+        raise ConfigError(f"AMOUNT is {amount!r}; write it as a number above 0 such as 7.50")
+    person, currency = await store.person(person_number(name)), study.settings.pay.currency
+    key = await grant(store, person, Decimal(amount), currency, arguments.reason)
+    print(f"{key}  {Decimal(amount):.2f} {currency}  {arguments.reason}  owed")
 
 
 async def _note(store: "Store", key: str, reference: str) -> None:

@@ -26,6 +26,8 @@ from mjsim.support.files import write_text_atomically
 
 TEXTS = "texts.csv"
 FREE = ("line", "text")  # types of survey items with free-text answers
+# Control characters and marks of the writing direction, which make a text look different from what it is
+INVISIBLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # characters that can start a spreadsheet formula
 Row = TypeVar("Row", Answer, PhaseRow)
 _NAME = re.compile(r"p?(\d{1,9})", re.ASCII)
@@ -113,14 +115,17 @@ def collect_visits(folder: Path) -> Collected:
 
 def write_collected(collected: Collected, out: Path) -> Sequence[Path]:
     """Write `trials.parquet`, `trials.csv` and `texts.csv` into a folder, and return their paths."""
-    out.mkdir(parents=True, exist_ok=True)
-    (out / INDEX).touch()
+    out.mkdir(0o700, parents=True, exist_ok=True)
+    (out / INDEX).touch(0o600)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("participant", "item", "text"))
     writer.writerows((person, item, harmless(words)) for person, item, words in collected.texts)
     write_text_atomically(out / TEXTS, text.getvalue())
-    return [*write_tables(out, collected.rows), out / TEXTS]
+    written = [*write_tables(out, collected.rows), out / TEXTS]
+    for path in written:
+        path.chmod(0o600)  # the folder may be an older one that others can read
+    return written
 
 
 def person_name(person: PersonRow) -> str:
@@ -142,7 +147,8 @@ def person_number(name: str) -> int:
 
 
 def harmless(text: str) -> str:
-    """Escape text that a spreadsheet would evaluate as a formula."""
+    """Replace invisible characters, and escape text that a spreadsheet would evaluate as a formula."""
+    text = INVISIBLE.sub("\N{REPLACEMENT CHARACTER}", text)
     return f"'{text}" if text.startswith(FORMULA) else text
 
 

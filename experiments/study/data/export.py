@@ -108,8 +108,9 @@ async def export(study: Study, store: Store, folder: Path, out: Path, *, replace
         _write(made, study, {name: table for name, table in tables.items() if table})
         for row in trials:
             shutil.copytree(folder / row.folder, made / RUNS / _name(row) / row.phase)
-        made.chmod(0o755)
         (made / INDEX).write_bytes((out / INDEX).read_bytes() if (out / INDEX).is_file() else b"")
+        for path in (made, *made.rglob("*")):
+            path.chmod(0o700 if path.is_dir() else 0o600)
         note_copy(folder, "export", out)
         if out.exists():
             exchange(made, out)

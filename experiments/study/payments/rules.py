@@ -8,10 +8,12 @@ from experiments.errors import StoreError
 from experiments.record.phases import ALL_DELIVERED, TASK
 from experiments.study.data.collect import person_name
 from experiments.study.file import Pay, Study
-from experiments.visit.plan import PLAYED
+from experiments.visit.plan import DEBRIEFING, PLAYED
 from experiments.visit.store import PaymentEvent, PersonRow, Store, TrialRow
 from experiments.visit.store.ledger import ONCE
 from experiments.visit.store.values import PaymentKind
+
+GRANT = "grant"  # part of the keys of payments that no rule gives
 
 
 @dataclass(frozen=True)
@@ -39,23 +41,20 @@ def due(
     for person in people:
         if person.id in rejected:
             continue
-        if person.status == "finished":
+        ended = person.status in ("withdrawn", "timed_out")
+        if person.status == "finished" or (ended and person.phase == DEBRIEFING):
             found.append(_due(person, "reward", pay.reward, pay, "finished the study"))
             if person.id in delivered:
                 found.append(_due(person, "bonus", pay.bonus_for_all, pay, "put everything away"))
         elif person.status == "screened_out":
-            if person.phase not in PLAYED:
-                found.append(
-                    _due(person, "screen_out", pay.screen_out, pay, f"screened out by {person.phase}")
-                )
-                continue
-            found.append(_due(person, "screen_out", pay.screen_out, pay, "no place was left"))
-            done = phases.index(person.phase)
+            why = "no place was left" if person.phase in PLAYED else f"screened out by {person.phase}"
+            found.append(_due(person, "screen_out", pay.screen_out, pay, why))
+            done = phases.index(person.phase) if person.phase in phases else 0
+            worked = done > phases.index(TASK) or (pay.partial and person.phase in PLAYED)
             more = pay.reward * done / len(phases) - pay.screen_out
-            if pay.partial and more > 0.0:
-                why = f"no place was left after {done} of {len(phases)} phases"
-                found.append(_due(person, "bonus", more, pay, why))
-        elif person.status in ("withdrawn", "timed_out") and pay.partial and person.phase in phases:
+            if worked and more > 0.0:
+                found.append(_due(person, "bonus", more, pay, f"{why} after {done} of {len(phases)} phases"))
+        elif ended and pay.partial and person.phase in phases:
             done = phases.index(person.phase)
             if done >= phases.index(TASK):
                 left = "left" if person.status == "withdrawn" else "did not return"
@@ -96,6 +95,26 @@ async def reject(store: Store, person: PersonRow, currency: str, why: str) -> No
     if decided := [event.key for event in await store.ledger.history(person.id) if event.kind != "rejection"]:
         raise StoreError(f"{decided[0]} was decided, and stays so; reject before payments are decided")
     await store.ledger.decide(person.id, "rejection", 0, currency, f"{name}-rejection", why)
+
+
+async def grant(store: Store, person: PersonRow, amount: Decimal, currency: str, why: str) -> str:
+    """Record that a participant is owed an amount that no rule gives. Return the key of the payment.
+
+    Raises:
+        StoreError: The participant was already granted the same amount for the same reason.
+    """
+    cents = int(amount * 100)
+    given = [event for event in await store.ledger.history(person.id) if event.event == "decided"]
+    earlier = [event for event in given if f"-{GRANT}-" in event.key]
+    if same := [event.key for event in earlier if (event.cents, event.note) == (cents, why)]:
+        raise StoreError(
+            f"{same[0]} is the same amount for the same reason; give another reason to pay again"
+        )
+    key = f"{person_name(person)}-{GRANT}-{len(earlier) + 1}"
+    await store.ledger.decide(person.id, "bonus", cents, currency, key, why)
+    details = {"person": person.id, "key": key, "cents": cents, "currency": currency, "reason": why}
+    await store.audit("command line", "payment granted", details)
+    return key
 
 
 def _due(person: PersonRow, kind: PaymentKind, amount: float, pay: Pay, why: str) -> Due:

@@ -65,7 +65,7 @@ class Surroundings:
     house: House
     parameters: Mapping[str, str]  # query parameters of the platform's links, with empty ids
     minimum: Mapping[str, float]  # minimum duration of each phase, in seconds, enforced by the server
-    attempts: int  # number of attempts allowed at the comprehension check
+    attempts: int | None  # number of attempts allowed at the comprehension check
     factor: float  # factor by which waiting times are divided
     hasty: bool = False  # True to submit forms too early as well, which the server must refuse
     watch: Watch = _ignore  # called with the name of each page and the server's response
@@ -134,8 +134,8 @@ class SimulatedPerson:
 
     async def _send_early(self, phase: Phase) -> None:
         if self._around.minimum.get(phase.name, 0.0) > 0.0:
-            answer = await self._post(self.rehearsed.link, form_of(phase, self._rng))
-            if answer.status_code == httpx.codes.SEE_OTHER:
+            await self._post(self.rehearsed.link, form_of(phase, self._rng))
+            if not await self._still_in(phase.name):
                 self._fault(f"{phase.name} ends before its minimum time")
 
     def _ended(self, page: httpx.Response) -> str:
@@ -156,11 +156,11 @@ class SimulatedPerson:
             await self._post(f"{link}/answers", form)
         minimum, careless = self._around.minimum.get(phase.name, 0.0), self._planned.wrong and not tries
         await asyncio.sleep(minimum)
-        careless &= phase.name != COMPREHENSION or self._around.attempts > 1
+        careless &= phase.name != COMPREHENSION or self._around.attempts != 1
         wrong = wrong_form(phase, form)
         if wrong is not None and (leaves == "fails" or careless):
-            answer = await self._post(link, wrong)
-            if answer.status_code == httpx.codes.SEE_OTHER and leaves != "fails":
+            await self._post(link, wrong)
+            if leaves != "fails" and not await self._still_in(phase.name):
                 self._fault(f"{phase.name} accepts a form that it should refuse")
             return
         if leaves == "refuses":
@@ -168,11 +168,15 @@ class SimulatedPerson:
         elif leaves == "gives up":
             form = {**form, "latency_ms": "999999", "give_up": "yes"}
         sent = [self._post(link, form) for _ in range(2 if self._planned.twice else 1)]
-        statuses = [answer.status_code for answer in await asyncio.gather(*sent)]
-        if httpx.codes.SEE_OTHER in statuses:
+        await asyncio.gather(*sent)
+        if not await self._still_in(phase.name):
             self.rehearsed.answers[phase.name] = form
         elif tries:
             self._fault(f"the form of {phase.name} was not accepted")
+
+    async def _still_in(self, phase: str) -> bool:
+        found = SHOWN.search((await self._get(self.rehearsed.link)).text)
+        return found is not None and phase in found.groups()
 
     async def _leave(self, how: str) -> str:
         if how != "vanishes":

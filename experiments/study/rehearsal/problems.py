@@ -11,6 +11,13 @@ from mjsim.support.files import read_text
 
 PAID = ("prolific", "connect", "external-question")  # platforms that pay participants
 EXAMPLES = ("your institution", "example.org", "example.com")
+# Content of a consent text, by name in the section `consent_check` of the texts
+NAMED = {
+    "legal_basis": "the legal basis",
+    "retention": "how long data are kept",
+    "rights": "the participant's rights",
+    "stopping": "the pay of a participant who stops early",
+}
 
 
 @dataclass(frozen=True)
@@ -38,12 +45,19 @@ def _found(study: Study) -> Iterator[tuple[str, str]]:
         yield "institution", f"institution is {settings.institution!r}; name your institution"
     if CONSENT not in settings.phases:
         yield "phases", "participants are not asked for consent; add the phase consent"
+    elif lacks := _lacks(study):
+        yield "texts", f"the consent text does not name {', '.join(lacks)}; add a sentence to [consent]"
     try:
         recruiter(settings.recruitment)
     except ConfigError as error:
         yield "recruitment", str(error)
     if not pay.reward and settings.recruitment.platform in PAID:
         yield "pay", f"reward is 0; people of {settings.recruitment.platform} are paid"
+    if not pay.screen_out and settings.recruitment.platform in PAID:
+        yield (
+            "pay.screen_out",
+            "screen_out is 0.00, so people who are screened out work without pay; set an amount above 0",
+        )
     hourly = 60.0 * pay.reward / settings.minutes
     if hourly < pay.wage:
         yield (
@@ -55,6 +69,14 @@ def _found(study: Study) -> Iterator[tuple[str, str]]:
         yield "phases", "no question of the comprehension check has a right answer; give one of them `right`"
     if few := next((cell for cell in study.cells if len(cell.trials) < 2), None):
         yield "name", f"the cell {few.label} has one person; a cell needs two or more to be compared"
+
+
+def _lacks(study: Study) -> list[str]:
+    """Return what the consent text does not name."""
+    settings, text = study.settings, "\n".join(study.texts[CONSENT].paragraphs()).casefold()
+    words = {about: study.texts["consent_check"][name].split("|") for name, about in NAMED.items()}
+    words |= {"the controller": [settings.institution], "the address for questions": [settings.contact]}
+    return [about for about, any_of in words.items() if not any(word.casefold() in text for word in any_of)]
 
 
 def problems_of_length(study: Study, shortest: float, longest: float) -> list[Problem]:

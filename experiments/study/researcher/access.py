@@ -14,7 +14,9 @@ from experiments.web.server.guards import Rate
 
 COOKIE = "mjsim-login"
 LASTS = datetime.timedelta(hours=12)
-ATTEMPTS = 10, 300.0  # maximum number of login attempts per address and per name, and the period in seconds
+# Maximum number of login attempts per address with one name and with any name, and the period in seconds. The attempts
+# of other addresses do not count, so that nobody can lock the account of another researcher.
+ATTEMPTS, ALL_ATTEMPTS = (10, 300.0), (40, 300.0)
 CHECKS = 2  # maximum number of concurrent password checks, each of which needs 64 MiB
 ORDER: tuple[Role, ...] = ("viewer", "assistant", "owner")  # roles in order of increasing permissions
 
@@ -30,7 +32,7 @@ class Access:
     def __init__(self, researchers: Researchers, *, secure: bool) -> None:
         self._researchers, self._secure = researchers, secure
         self._cookie = f"__Host-{COOKIE}" if secure else COOKIE
-        self._from, self._names = Rate(*ATTEMPTS), Rate(*ATTEMPTS)
+        self._from, self._names = Rate(*ALL_ATTEMPTS), Rate(*ATTEMPTS)
         self._checks = asyncio.Semaphore(CHECKS)
 
     async def who(self, connection: HTTPConnection) -> Researcher | None:
@@ -39,8 +41,8 @@ class Access:
         return None if token is None else await self._researchers.who(token_hash(token))
 
     def may_try(self, address: str, name: str) -> bool:
-        """Count a login attempt. Return True if the limits per address and per name allow it."""
-        return self._from.allows(address) and self._names.allows(name)
+        """Count a login attempt. Return True if the limits for the address and for its use of the name allow it."""
+        return self._from.allows(address) and self._names.allows(f"{address} {name}")
 
     async def log_in(self, connection: HTTPConnection, name: str, password: str) -> str | None:
         """Log in a researcher. Return the token of the login, or None if the credentials are wrong."""

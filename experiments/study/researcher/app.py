@@ -141,6 +141,8 @@ class ResearcherServer:
         token = await self._access.log_in(request, name, form.get("password", ""))
         if token is None:
             LOG.warning("failed login to the researcher's page")
+            known = name in {one.name for one in await self._store.researchers.all()}
+            await self._store.audit(name if known else "unknown", "login failed")
             note = "Name or password is wrong."
             return page(request, "researcher/login", 403, title=title, note=note)
         await self._store.audit(name, "logged in")

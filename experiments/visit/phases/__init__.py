@@ -17,13 +17,14 @@ from experiments.visit.phases.base import (
     TrialPhase,
 )
 from experiments.visit.phases.device import DeviceCheck
+from experiments.visit.phases.film import Film
 from experiments.visit.plan import VisitPlan
 
 KINDS: Mapping[str, Callable[[VisitPlan], Phase]] = {
     names.CONSENT: lambda plan: Consent(plan, names.CONSENT, "consent"),
     names.DEVICE: lambda plan: DeviceCheck(plan, names.DEVICE, "device"),
     STORY: lambda plan: Story(plan, STORY),
-    FLYTHROUGH: lambda plan: FormPhase(plan, FLYTHROUGH, "study_film"),
+    FLYTHROUGH: lambda plan: Film(plan, FLYTHROUGH, "study_film"),
     names.COMPREHENSION: lambda plan: Comprehension(plan, names.COMPREHENSION, "comprehension"),
     TRAINING: lambda plan: TrialPhase(plan, TRAINING),
     TASK: lambda plan: TrialPhase(plan, TASK),

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from hashlib import sha256
 from typing import Any, Literal, Protocol, runtime_checkable
 
 from starlette.datastructures import ImmutableMultiDict
@@ -29,7 +30,7 @@ class Visitor:
 
     Attributes:
         shown_s: Time since the phase was first shown, in seconds.
-        attempts: Number of rejected submissions in this phase.
+        attempts: Number of rejected submissions that count as attempts in this phase.
         path: URL path of the participant's pages.
         metrics: Metrics of the task in the phase `result`, otherwise None.
     """
@@ -59,10 +60,15 @@ class Done:
 
 @dataclass(frozen=True)
 class Again:
-    """The result of rejecting a form. The page is shown again with `note` as the error message."""
+    """The result of rejecting a form. The page is shown again with `note` as the error message.
+
+    Attributes:
+        counts: True if the form counts as an attempt.
+    """
 
     note: str
     values: Mapping[str, Any] = field(default_factory=dict)
+    counts: bool = True
 
 
 @runtime_checkable
@@ -173,31 +179,53 @@ class Consent(FormPhase):
         if sent.get("agree") != "yes":
             return Again(self._plan.texts["common"]["required"])
         read = super().read(visitor, sent)
-        return Done({"agreed": True, **read.answers}) if isinstance(read, Done) else read
+        if isinstance(read, Again):
+            return read
+        text = {
+            "text_version": self._plan.consent_version,
+            "text_sha256": sha256(self.copy.encode()).hexdigest(),
+        }
+        return Done({"agreed": True, **text, **read.answers})
+
+    @property
+    def copy(self) -> str:
+        """Text that the participant agrees to. Its hash is stored with the agreement."""
+        return "\n\n".join((self.texts["title"], *self.texts.paragraphs(), self.texts["agree"])) + "\n"
 
     def example(self) -> dict[str, str]:
         return {"agree": "yes", **super().example()}
 
 
 class Comprehension(FormPhase):
-    """The comprehension check. A participant who fails too many attempts is screened out."""
+    """The comprehension check. A participant who fails too many attempts is screened out.
 
-    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
+    Only complete forms count as attempts. Each page contains the number of the attempt, so that a page that is
+    submitted twice counts once.
+    """
+
+    def values(self, visitor: Visitor) -> Mapping[str, Any]:
         """Return additional values for the page's template."""
-        return {"story": self._plan.story_paragraphs}
+        limit = self._plan.limits.attempts
+        left = (
+            "" if limit is None else self.texts["attempts"].replace("{left}", str(limit - visitor.attempts))
+        )
+        return {"story": self._plan.story_paragraphs, "attempt": visitor.attempts, "attempts_left": left}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
         """Validate a submitted form. Return its values, or the reason why the form is refused."""
         read = super().read(visitor, sent)
         if isinstance(read, Again):
+            return dataclasses.replace(read, counts=False)
+        again = Again(self.texts["wrong"], {"form": self._form(None, read.answers)})
+        if sent.get("attempt", str(visitor.attempts)) != str(visitor.attempts):
+            return dataclasses.replace(
+                again, counts=False
+            )  # the attempt of this page has already been counted
+        if not any(item.is_wrong(read.answers.get(item.name)) for item in self.items):
             return read
-        wrong = any(item.is_wrong(read.answers.get(item.name)) for item in self.items)
-        answers = dict(read.answers)
-        if not wrong:
-            return Done(answers)
-        if visitor.attempts + 1 >= self._plan.limits.attempts:
-            return Done(answers, "screened_out")
-        return Again(self.texts["wrong"], {"form": self._form(None, read.answers)})
+        limit = self._plan.limits.attempts
+        last = limit is not None and visitor.attempts + 1 >= limit
+        return Done(read.answers, "screened_out") if last else again
 
 
 class Survey(FormPhase):

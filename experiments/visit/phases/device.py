@@ -37,8 +37,8 @@ class _Measured:
 class DeviceCheck(FormPhase):
     """A page that tests the participant's computer and submits the results."""
 
-    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
-        return {"keyboard": self._plan.device.keyboard}
+    def values(self, visitor: Visitor) -> Mapping[str, Any]:
+        return {"keyboard": self._plan.device.keyboard, "failed": visitor.attempts > 0}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002
         measured = _measured(sent)
@@ -54,7 +54,7 @@ class DeviceCheck(FormPhase):
         if sent.get("give_up"):
             return Done({**answers, "faults": faults}, "screened_out" if faults else "next")
         if faults:
-            return Again(" ".join(self.texts[name] for name in faults), {"failed": True})
+            return Again(" ".join(self.texts[name] for name in faults))
         return Done(answers)
 
     def example(self) -> dict[str, str]:

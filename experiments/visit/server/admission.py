@@ -4,6 +4,8 @@ import asyncio
 import hmac
 import logging
 import time
+from collections.abc import Mapping
+from typing import Any
 
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
@@ -43,19 +45,24 @@ class Admission:
             return await self._again(request, came, person)
         if (closed := await self._closed()) is not None:
             return self._pages.closed(request, closed)
+        return self._first_page(request, request.query_params, preview=isinstance(came, Preview))
+
+    def _first_page(
+        self, request: Request, ids: Mapping[str, str], status: int = 200, **values: Any
+    ) -> Response:
+        platform = self._recruiter.platform
         return self._pages.show(
             request,
             "welcome",
+            status,
             section=self._plan.texts["welcome"],
-            parameters={name: request.query_params.get(name, "") for name in self._recruiter.parameters},
-            remembers=self._recruiter.platform == "link",
-            forgets=self._recruiter.platform == "lab",
-            preview=isinstance(came, Preview),
+            parameters={name: ids.get(name, "") for name in self._recruiter.parameters},
+            remembers=platform == "link",
+            forgets=platform == "lab",
+            **values,
         )
 
     async def begin(self, request: Request) -> Response:
-        if not self._new.allows(request.client.host if request.client else ""):
-            return self._pages.message(request, "paused", 429)
         form = {name: str(value) for name, value in (await sent_form(request)).items()}
         came = self._recruiter.arrive(form)
         if not isinstance(came, Candidate):
@@ -64,6 +71,10 @@ class Admission:
             return await self._again(request, came, person, form.get(TOKEN, ""))
         if (closed := await self._closed()) is not None:
             return self._pages.closed(request, closed)
+        if not self._new.allows(request.client.host if request.client else "", came.key or ""):
+            response = self._first_page(request, form, 429, note=self._plan.texts["welcome"]["busy"])
+            response.headers["Retry-After"] = f"{NEW_PEOPLE[1]:.0f}"
+            return response
         return await self._arrive(came)
 
     async def _known(self, came: Candidate) -> PersonRow | None:

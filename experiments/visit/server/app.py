@@ -15,7 +15,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from experiments.errors import RecordError, StoreError
-from experiments.visit.phases.base import Again, TrialPhase
+from experiments.visit.phases.base import Consent, TrialPhase
 from experiments.visit.plan import RESULT
 from experiments.visit.procedure import PhaseState, Procedure
 from experiments.visit.server.admission import Admission
@@ -85,6 +85,7 @@ class VisitServer:
                 Route("/play/{token}/answers", self._save, methods=["POST"]),
                 Route("/play/{token}/withdrawal", self._ask_to_leave),
                 Route("/play/{token}/withdrawal", self._leave, methods=["POST"]),
+                Route("/play/{token}/consent.txt", self._consent),
                 Route("/play/{token}/film", self._film),
                 Route("/play/{token}/floor-plan.png", self._floor_plan),
                 Route("/play/{token}/ping", self._ping),
@@ -138,10 +139,8 @@ class VisitServer:
         person, form = await self._person(request), await sent_form(request)
         async with self._lock(person):
             now = await self._procedure.now(person, request.url.path)
-            refused = await self._procedure.submit(now, str(form.get("phase", "")), form)
-        if refused is not None:
-            return await self._show_phase(request, person, refused)
-        return RedirectResponse(request.url.path, 303)
+            await self._procedure.submit(now, str(form.get("phase", "")), form)
+        return RedirectResponse(request.url.path, 303)  # so that Back and reload do not send the form again
 
     async def _save(self, request: Request) -> Response:
         person, form = await self._person(request), await sent_form(request)
@@ -165,6 +164,14 @@ class VisitServer:
             self.sessions.limit.release(person.token_hash)  # a participant may have a slot but no session yet
             await self._procedure.withdraw(person, delete=form.get("data") == "delete")
         return RedirectResponse(f"/play/{request.path_params['token']}", 303)
+
+    async def _consent(self, request: Request) -> Response:
+        await self._person(request)
+        consent = next((one for one in self._procedure.phases if isinstance(one, Consent)), None)
+        if consent is None:
+            return PlainTextResponse("not found\n", 404)
+        saved = {"Content-Disposition": 'attachment; filename="consent.txt"'}
+        return PlainTextResponse(consent.copy, headers=saved)
 
     async def _film(self, request: Request) -> Response:
         await self._person(request)
@@ -193,16 +200,14 @@ class VisitServer:
             return
         await self._trials.play(socket, person)
 
-    async def _show_phase(
-        self, request: Request, person: PersonRow, refused: Again | None = None
-    ) -> Response:
+    async def _show_phase(self, request: Request, person: PersonRow) -> Response:
         async with self._lock(person):
             now = await self._procedure.now(person, request.url.path)
             if isinstance(now.phase, TrialPhase):
                 return await self._played(request, now)
         finished = now.number == len(self._procedure.phases)
         identity = await self._store.identity(person.id) if finished else {}
-        return self._pages.phase(request, now, identity, refused)
+        return self._pages.phase(request, now, identity, self._procedure.refusal(now))
 
     async def _played(self, request: Request, now: PhaseState) -> Response:
         person = now.person

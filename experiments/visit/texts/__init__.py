@@ -12,6 +12,8 @@ from experiments.visit.texts.items import Item
 from mjsim.support.files import read_bytes
 
 FOLDER = Path(__file__).parents[2] / "texts"
+_HEADER = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]")
+_ITEM = re.compile(r"`\$\.item\[(\d+)\](?:\.(\w+))?")
 _PLACE = re.compile(r"\{(\w+)\}")
 
 
@@ -52,7 +54,8 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
     Args:
         language: Language tag. If the project has no file for the language, `path` must contain all texts.
         path: The study's own file, or None. The items of a section replace all its default items.
-        values: Values of placeholders such as `{name}`, by name.
+        values: Values of placeholders such as `{name}`, by name. `keep_days` and `partial` also choose between texts
+            of the consent form.
 
     Raises:
         ConfigError: A file cannot be read, or has an unknown section, text or placeholder.
@@ -70,13 +73,18 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
             raise ConfigError(f"{path}: [{name}] lacks {missing[0]!r} in language {language!r}")
     for name, table in own.items():
         if name not in usual:
-            raise ConfigError(f"{path}: no section [{name}]; there are {', '.join(usual)}")
+            raise ConfigError(f"{_at(path, name)}: no section [{name}]; there are {', '.join(usual)}")
         if unknown := sorted(set(table) - set(usual[name]) - {"item", "scale"}):
+            where = _at(path, name, unknown[0])
             raise ConfigError(
-                f"{path}: no text {unknown[0]!r} in [{name}]; there are {', '.join(usual[name])}"
+                f"{where}: no text {unknown[0]!r} in [{name}]; there are {', '.join(usual[name])}"
             )
     tables = {name: {**table, **own.get(name, {})} for name, table in usual.items()}
-    values = {"pay": tables["common"]["no_payment"], **values}
+    consent, unpaid, days = tables["consent"], tables["common"]["no_payment"], values.get("keep_days", "")
+    retention = str(consent["kept_days" if days else "kept"]).replace("{keep_days}", days)
+    stopping = consent["stop_partial" if "partial" in values else "stop_unpaid"]
+    chosen = {"pay": unpaid, "screen_out": unpaid, "retention": retention, "stopping": stopping}
+    values = {**chosen, **values}
     return {name: _section(name, table, english[name], values, path) for name, table in tables.items()}
 
 
@@ -104,35 +112,67 @@ def _tables(path: Path) -> dict[str, dict[str, Any]]:
 def _section(
     name: str, table: dict[str, Any], english: dict[str, Any], values: Mapping[str, str], path: Path | None
 ) -> Section:
-    where = f"{path}: " if path else ""
+    words = {key: value for key, value in table.items() if key not in ("item", "scale")}
+    for key, value in words.items():
+        if not isinstance(value, str):
+            raise ConfigError(f"{_at(path, name, key)}: [{name}] {key} is {value!r}; write a text in quotes")
     try:
         form = msgspec.convert({key: table[key] for key in ("item", "scale") if key in table}, _Items)
-        words = {key: value for key, value in table.items() if key not in ("item", "scale")}
-        words = msgspec.convert(words, dict[str, str])
     except msgspec.ValidationError as error:
-        raise ConfigError(f"{where}[{name}]: {error}") from error
-    if len({item.name for item in form.item}) < len(form.item):
-        raise ConfigError(f"{where}[{name}] has two items of one name")
-    for item in form.item:
+        raise ConfigError(_item_fault(path, name, table, str(error))) from error
+    names = [item.name for item in form.item]
+    for number, item in enumerate(form.item):
+        if item.name in names[:number]:
+            where = _at(path, name, "name", number)
+            raise ConfigError(f"{where}: [{name}] has two items with the name {item.name!r}; rename one")
         points = range(1, len(form.scale or ()) + 1)
         if item.kind == "scale" and item.right is not None and item.right not in points:
+            where = _at(path, name, "right", number)
             raise ConfigError(
-                f"{where}[{name}] item {item.name}: right is {item.right!r}, no point of the scale"
+                f"{where}: [{name}] item {item.name}: right is {item.right!r}, no point of the scale"
             )
     filled = {
-        key: _filled(text, values, str(english.get(key, "")), f"{where}[{name}] {key}")
+        key: _filled(text, values, str(english.get(key, "")), (path, name, key))
         for key, text in words.items()
     }
     return Section(filled, tuple(form.item), tuple(form.scale or ()))
 
 
-def _filled(text: str, values: Mapping[str, str], english: str, where: str) -> str:
+def _item_fault(path: Path | None, section: str, table: dict[str, Any], message: str) -> str:
+    """Add the line and the value to an error message of msgspec about the items of a section."""
+    if (found := _ITEM.search(message)) is None:
+        return f"{_at(path, section)}: [{section}]: {message}"
+    number, key = int(found[1]), found[2] or ""
+    value = f"{key} is {table['item'][number].get(key)!r}; " if key else ""
+    return f"{_at(path, section, key, number)}: [{section}] item {number + 1}: {value}{message}"
+
+
+def _at(path: Path | None, section: str, key: str = "", item: int | None = None) -> str:
+    """Return the path of a study's texts with the line of a section, of one of its items, or of a key in these."""
+    if path is None:
+        return "texts"
+    wanted, header, best, items = (section if item is None else f"{section}.item"), "", 0, -1
+    for number, line in enumerate(path.read_text("utf-8", "replace").splitlines(), 1):
+        if found := _HEADER.match(line):
+            header = found[1]
+            items += header == f"{section}.item"
+        elif header != wanted or not key or not re.match(rf"\s*{re.escape(key)}\s*=", line):
+            continue
+        if header == wanted and (item is None or items == item):
+            best = number
+            if found is None:
+                break
+    return f"{path}, line {best}" if best else str(path)
+
+
+def _filled(text: str, values: Mapping[str, str], english: str, place: tuple[Path | None, str, str]) -> str:
     places = _PLACE.findall(english)
     later = {*places, *(name.capitalize() for name in places if name.islower())} - set(values)
 
     def value(found: re.Match[str]) -> str:
         if found[1] in values or found[1] in later:
             return values.get(found[1], found[0])
-        raise ConfigError(f"{where} has a place {found[0]}; there are {', '.join(sorted({*values, *later}))}")
+        names, (_, section, key) = ", ".join(sorted({*values, *later})), place
+        raise ConfigError(f"{_at(*place)}: [{section}] {key} has a place {found[0]}; there are {names}")
 
     return _PLACE.sub(value, text)

@@ -141,14 +141,20 @@ class Rate:
 
     def __init__(self, count: int, period: float) -> None:
         self._count, self._period = count, period
-        self._log: list[tuple[float, str]] = []
+        self._log: list[tuple[float, str, str]] = []
 
-    def allows(self, address: str) -> bool:
-        """Count a request. Return True if it is within the limit."""
+    def allows(self, address: str, sender: str = "") -> bool:
+        """Count a request. Return True if it is within the limit.
+
+        Args:
+            sender: Identity of the sender, or empty if it is unknown. All requests of a known sender count as one.
+        """
         now = time.monotonic()
-        self._log = [(at, who) for at, who in self._log if now - at < self._period]
-        allowed = sum(who == address for _, who in self._log) < self._count
-        self._log += [(now, address)] * allowed
+        self._log = [one for one in self._log if now - one[0] < self._period]
+        if sender and any(one[1:] == (address, sender) for one in self._log):
+            return True
+        allowed = sum(one[1] == address for one in self._log) < self._count
+        self._log += [(now, address, sender)] * allowed
         return allowed
 
 

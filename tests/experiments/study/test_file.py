@@ -76,6 +76,10 @@ def test_cells_share_what_is_one_for_all(tmp_path):
         read_people_study(path)
 
 
+PLACES = ("title", "institution", "contact", "minutes", "pay")
+ITEM = '[[survey.item]]\nname = "{}"\nkind = "{}"\ntext = "?"\n'
+
+
 def test_own_texts_replace_some_and_are_checked(tmp_path):
     values = {name: name for name in ("title", "institution", "contact", "minutes", "pay")}
     own = tmp_path / "texts.toml"
@@ -98,7 +102,27 @@ def test_own_texts_replace_some_and_are_checked(tmp_path):
             read_texts("en", own, values)
 
 
-PLACES = ("title", "institution", "contact", "minutes", "pay")
+@pytest.mark.parametrize(
+    ("content", "line", "said"),
+    [
+        ('[story]\ntitle = "x"\n\n[stories]\ntitle = "x"\n', 4, r"no section \[stories\]"),
+        ('[story]\ntitle = "x"\nheading = "x"\n', 3, "no text 'heading' in"),
+        ('[welcome]\ntitle = "x"\n[story]\ntitle = 3\n', 4, "title is 3; write a text"),
+        ('[story]\n[consent]\ntitle = "x"\ntext = """\nA {nobody}"""\n', 4, r"text has a place \{nobody\}"),
+        (
+            f"{ITEM.format('a', 'text')}{ITEM.format('b', 'essay')}",
+            7,
+            "item 2: kind is 'essay'; Invalid enum",
+        ),
+        (f"{ITEM.format('a', 'text')}{ITEM.format('a', 'line')}", 6, "two items with the name 'a'"),
+        (f"{ITEM.format('a', 'text')}{ITEM.format('b', 'scale')}right = 9\n", 9, "right is 9, no point"),
+    ],
+)
+def test_errors_of_ones_own_texts_name_line_and_value(tmp_path, content, line, said):
+    own = tmp_path / "texts.toml"
+    own.write_text(content)
+    with pytest.raises(ConfigError, match=rf"^{re.escape(str(own))}, line {line}: .*{said}"):
+        read_texts("en", own, {name: name for name in PLACES})
 
 
 def shape(texts):

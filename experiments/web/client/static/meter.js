@@ -70,6 +70,14 @@ export class Meter {
   }
 }
 
+/**
+ * Returns true if a report measured no frames because the picture did not change. The server sends no frames then, so the
+ * report says nothing about the display.
+ * @param {{ draw: "browser" | "server", frames_per_s: number, dropped: number, latency_ms: number | null }} report
+ */
+export const isStill = ({ draw, frames_per_s, dropped, latency_ms }) =>
+  draw === "server" && !frames_per_s && !dropped && latency_ms === null;
+
 /** @param {number[]} values @param {number} share */
 const quantile = (values, share) => values.sort((a, b) => a - b)[Math.floor(share * (values.length - 1))];
 

@@ -14,6 +14,7 @@ import { Help } from "./help.js";
 import { Hud } from "./hud.js";
 import { Inputs } from "./inputs.js";
 import { connectKeyboard } from "./keyboard.js";
+import { isStill } from "./meter.js";
 import { watchPage } from "./page_events.js";
 import { pauseReason, resumes, shownIn } from "./page_state.js";
 import { Panel } from "./panel.js";
@@ -162,7 +163,7 @@ function update() {
   shown = next;
   const stopped = session.phase === "running" ? "paused" : session.phase;
   page.dataset.phase = shown === "task" ? "running" : stopped; // the style sheet hides the task while the clock is stopped
-  byId("redraw-button", HTMLElement).hidden = draw !== "auto" || !picture.fault;
+  for (const id of ["redraw-button", "server-draws"]) byId(id, HTMLElement).hidden = draw !== "auto" || !picture.fault;
   if (shown === "task" || shown === "help") panel.hide();
   else if (shown === "instructions") panel.show(instructions());
   else panel.show(dialogs.dialogOf(shown, now, left, picture.fault));
@@ -192,7 +193,7 @@ function report() {
   const { kilobits, ...seen } = picture.report();
   const { width, height } = canvas.getBoundingClientRect();
   const size = { width: Math.max(1, Math.round(width)), height: Math.max(1, Math.round(height)) };
-  if (seen.renderer) {
+  if (seen.renderer && !isStill(seen)) {
     connection.send({ type: "display", ...seen, ...size, pixel_ratio: window.devicePixelRatio || 1 });
   }
   byId("debug", HTMLElement).textContent =

@@ -1,6 +1,6 @@
 import { beforeEach, expect, test, vi } from "vitest";
 
-import { Meter } from "../static/meter.js";
+import { Meter, isStill } from "../static/meter.js";
 
 /** @import { FrameMessage } from "../static/protocol.js" */
 
@@ -36,4 +36,13 @@ test("latency is measured once per input, until the first frame that shows it", 
   expect(meter.take().latency_ms).toBe(60);
   meter.answered(2);
   expect(meter.take().latency_ms).toBeNull();
+});
+
+test("a picture of the server that does not change is no slow picture", () => {
+  const report = { ...meter.take(), draw: /** @type {"server"} */ ("server") };
+  expect(isStill(report)).toBe(true);
+  expect(isStill({ ...report, draw: "browser" })).toBe(false);
+  expect(isStill({ ...report, latency_ms: 40 })).toBe(false);
+  expect(isStill({ ...report, dropped: 1 })).toBe(false);
+  expect(isStill({ ...report, frames_per_s: 0.2 })).toBe(false);
 });

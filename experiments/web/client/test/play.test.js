@@ -464,7 +464,7 @@ describe("a browser that draws", () => {
     happens();
     expect(socket().all("draw").at(-1)).toEqual({ type: "draw", draw: "server", reason });
     expect(socket().all("view")).toMatchObject([{ codec: "jpeg" }]);
-    expect([part("world").hidden, part("redraw-button").hidden]).toEqual([true, false]);
+    expect([part("world").hidden, part("redraw-button").hidden, part("server-draws").hidden]).toEqual([true, false, false]);
     expect(title()).toBe("One moment"); // there is no frame yet
     socket().state("paused", "picture lost");
     socket().onmessage({ data: frame({ number: 1 }) });

@@ -97,3 +97,32 @@ test("the researcher page refreshes its live numbers and keeps everything else",
   expect(/** @type {HTMLInputElement} */ (document.getElementById("wanted")).value).toBe("4");
   vi.useRealTimers();
 });
+
+describe("film", () => {
+  const value = (/** @type {string} */ name) => /** @type {HTMLInputElement} */ (document.querySelector(`[name=${name}]`)).value;
+  /** @param {string} required @param {Record<string, unknown>} film */
+  async function submitted(required, film) {
+    vi.resetModules();
+    document.body.innerHTML = `<form><video ${required}></video><p id="unplayed" hidden></p>
+      ${["played_s", "film_s", "film_error"].map((name) => `<input type="hidden" name="${name}">`).join("")}</form>`;
+    const ranges = { length: 2, start: (/** @type {number} */ i) => [0, 50][i], end: (/** @type {number} */ i) => [40, 80][i] };
+    const video = document.querySelector("video");
+    for (const [name, made] of Object.entries({ played: ranges, duration: 100, error: null, ...film })) Object.defineProperty(video, name, { value: made });
+    await import("../static/study/film.js");
+    const event = new Event("submit", { cancelable: true });
+    document.querySelector("form")?.dispatchEvent(event);
+    return [event.defaultPrevented, document.getElementById("unplayed")?.hidden];
+  }
+
+  test("reports how much was played", async () => {
+    expect(await submitted("", {})).toEqual([false, true]);
+    expect([value("played_s"), value("film_s"), value("film_error")]).toEqual(["70.0", "100.0", ""]);
+  });
+
+  test("asks for a required film to be played to its end, unless the browser cannot play it", async () => {
+    expect(await submitted("data-required", {})).toEqual([true, false]);
+    expect(await submitted("data-required", { duration: 72 })).toEqual([false, true]);
+    expect(await submitted("data-required", { error: { code: 4 }, duration: NaN })).toEqual([false, true]);
+    expect([value("film_s"), value("film_error")]).toEqual(["", "4"]);
+  });
+});

@@ -15,6 +15,7 @@ from experiments.trials.table import read_rows
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.visit.store import Store
+from mjsim.support.files import write_text_atomically
 
 BRIEF = TrialConfig(objects=1, assistance="optimal", seed=0, fidelity="event", regret=False)
 TEXT = "=HYPERLINK(1)"
@@ -73,8 +74,26 @@ def test_the_table_has_a_row_for_each_person_who_played(tmp_path, study, run):
     table, _, texts = write_collected(found, tmp_path / "out")
     assert read_rows(table)[0]["likert_useful"] == 4
     assert texts.name == TEXTS and f"'{TEXT}" in texts.read_text()
+    private(tmp_path / "out")
     for path in (tmp_path / "out").iterdir():
         assert b"secret-" not in path.read_bytes()
+
+
+def private(folder):
+    """Only the owner may read a folder and what is in it."""
+    assert not [path for path in (folder, *folder.rglob("*")) if path.stat().st_mode & 0o077]
+
+
+def test_tables_are_private_in_a_folder_that_is_not(tmp_path, study, run):
+    found, out = asyncio.run(_collected(study, tmp_path, run)), tmp_path / "out"
+    out.mkdir()
+    out.chmod(0o755)
+    for path in write_collected(found, out):
+        assert path.stat().st_mode & 0o777 == 0o600
+        write_text_atomically(path, "")
+        assert path.stat().st_mode & 0o777 == 0o600, "a private file stays private when it is replaced"
+    write_text_atomically(out / "other", "")
+    assert (out / "other").stat().st_mode & 0o777 == 0o644
 
 
 def test_a_run_that_was_changed_is_named(tmp_path, study, run):
@@ -106,6 +125,12 @@ def test_texts_are_no_formulas():
     for text in ("=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1"):
         assert harmless(text) == f"'{text}"
     assert harmless("a = b") == "a = b"
+
+
+@pytest.mark.parametrize("hidden", ["\0", "\x1b", "\x85", "\u202e", "\u2066", "\u200f"])
+def test_texts_have_no_invisible_characters(hidden):
+    assert harmless(f"a{hidden}[31mb\tc\r\nd") == "a\ufffd[31mb\tc\r\nd"
+    assert harmless(f"={hidden}1") == "'=\ufffd1"
 
 
 def test_a_person_is_erased_from_database_and_files_and_backups_move_the_rest(tmp_path, run, capsys):

@@ -101,6 +101,7 @@ def test_an_export_has_tables_runs_and_a_codebook(served, tmp_path):
     assert {"participant": "p00001", "phase": "survey", "item": "useful", "answer": "4"} in answers
     assert (out / "runs" / "p00001" / "task" / "events.jsonl").is_file()
     assert [path.name for path in (out / "runs").iterdir()] == ["p00001"]
+    assert not [path for path in (out, *out.rglob("*")) if path.stat().st_mode & 0o077]
     book = {row["name"]: row for row in rows_of(out / "documentation" / "codebook.csv")}
     assert book["likert_useful"]["values"].startswith("1 = strongly disagree; 2 = ")
     assert "objects in their receptacle" in book["delivered"]["description"]

@@ -48,7 +48,7 @@ def oracle(pay, status, phase, delivered):
         found = {"reward": reward, "bonus": Fraction(str(pay.bonus_for_all)) if delivered else 0}
     elif status == "screened_out":
         found = {"screen_out": screen_out}
-        if pay.partial and phase in ("training", "task"):
+        if phase == "survey" or (pay.partial and phase in ("training", "task")):
             found["bonus"] = share - screen_out
     elif status in ("withdrawn", "timed_out") and pay.partial and PHASES.index(phase) >= PHASES.index("task"):
         found = {"partial": share}

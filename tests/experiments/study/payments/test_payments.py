@@ -35,6 +35,81 @@ async def fill(store):
             await store.finish(person.id, status)
 
 
+async def end_in(store, phase, status):
+    person = await store.arrive("link", None, {}, f"{phase}-{status}".ljust(64), phase)
+    await store.finish(person.id, status)
+    return person
+
+
+@pytest.mark.parametrize("partial", [True, False])
+def test_work_that_was_done_is_paid_however_it_ended(tmp_path, partial):
+    async def run():
+        store = await Store.open(f"sqlite:///{tmp_path / 'study.db'}", "study", "0" * 64)
+        for phase, status in (
+            ("comprehension", "screened_out"),
+            ("survey", "screened_out"),
+            ("debriefing", "timed_out"),
+            ("debriefing", "withdrawn"),
+        ):
+            await end_in(store, phase, status)
+        payments = due(with_pay(pay), await store.people(), ())
+        await store.close()
+        return {payment.key: payment.cents for payment in payments}
+
+    pay = Pay(reward=10.0, screen_out=1.0, partial=partial)
+    assert asyncio.run(run()) == {
+        "p00001-screen_out": 100,
+        "p00002-screen_out": 100,
+        "p00002-bonus": 600,  # 7 of 10 phases, together
+        "p00003-reward": 1000,
+        "p00004-reward": 1000,
+    }
+
+
+def granted(folder, *words):
+    return main(["study", "pay", str(folder / "study.toml"), str(folder), "--grant", *words])
+
+
+def test_a_payment_outside_the_rules_is_owed_once_and_audited(tmp_path, capsys):
+    study = tmp_path / "study.toml"
+    assert main(["study", "init", str(study)]) == 0
+    read = read_people_study(study)
+
+    async def ask(work):
+        store = await Store.open(f"sqlite:///{tmp_path / 'study.db'}", read.settings.name, read.sha256)
+        found = await work(store)
+        await store.close()
+        return found
+
+    async def history(store):
+        return await store.ledger.history(), await store.audit_log()
+
+    asyncio.run(ask(fill))
+    assert granted(tmp_path, "p00004", "2.50", "--reason", "the server failed") == 0
+    for words in (
+        ("2.50", "--reason", "the server failed"),
+        ("0",),
+        ("-1", "--reason", "x"),
+        ("1.234", "--reason", "x"),
+    ):
+        assert granted(tmp_path, "p00004", *words) == 2
+    assert granted(tmp_path, "p00099", "1", "--reason", "x") == 2
+    assert "is the same amount for the same reason" in capsys.readouterr().err
+    assert granted(tmp_path, "p00004", "1", "--reason", "waited for long") == 0
+    events, log = asyncio.run(ask(history))
+    assert [(one.key, one.kind, one.cents, one.note) for one in events] == [
+        ("p00004-grant-1", "bonus", 250, "the server failed"),
+        ("p00004-grant-2", "bonus", 100, "waited for long"),
+    ]
+    found = [row.details for row in log if row.action == "payment granted"]
+    assert [(one["person"], one["cents"], one["reason"]) for one in found] == [
+        (4, 250, "the server failed"), (4, 100, "waited for long"),
+    ]  # fmt: skip
+    capsys.readouterr()
+    assert main(["study", "pay", str(study), str(tmp_path), "--dry-run"]) == 0
+    assert "p00004-grant-1  2.50 USD  the server failed  owed" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("pay", "expected"),
     [

@@ -21,6 +21,7 @@ from experiments.study.rehearsal.pictures import browser
 from experiments.study.rehearsal.problems import located, problems_of_file, problems_of_length
 from experiments.visit.phases import phases_of
 from experiments.visit.phases.base import Done, FormPhase
+from experiments.visit.texts import languages
 
 ENDS = {"type": "inputs", "inputs": [{"number": 1, "scroll": LAST}]}
 STUDY = """\
@@ -82,7 +83,12 @@ def test_a_good_file_has_no_problems(study):
         ("people@university.edu", "you@example.org", 19, "working address"),
         ("A university", "your institution", 18, "name your institution"),
         ("reward = 2.0", "reward = 2.0\nwage = 15.0", 23, "12.00 an hour, below the wage of 15.00"),
-        ("[study.pay]", '[study.recruitment]\nplatform = "prolific"\n[study.pay]', 22, "completed"),
+        (
+            "bonus_for_all = 1.0",
+            'screen_out = 1.0\n[study.recruitment]\nplatform = "prolific"',
+            26,
+            "completed",
+        ),
         ("people = 2", "people = 1", 16, "one person"),
     ],
 )
@@ -90,6 +96,49 @@ def test_problems_name_file_and_line(tmp_path, before, after, line, said):
     changed = with_text(tmp_path, only=(before, after))
     (found,) = located(changed, problems_of_file(changed))
     assert found.startswith(f"{changed.path}, line {line}: ") and said in found
+
+
+CODES = 'completed = "A"\nscreened_out = "B"\nno_consent = "C"'
+
+
+@pytest.mark.parametrize(("amount", "line"), [("\nscreen_out = 0.00", 26), ("", 22)])
+def test_people_of_a_platform_are_not_screened_out_without_pay(tmp_path, amount, line):
+    recruitment = f'bonus_for_all = 1.0{amount}\n[study.recruitment]\nplatform = "prolific"\n{CODES}'
+    changed = with_text(tmp_path, only=("bonus_for_all = 1.0", recruitment))
+    (found,) = located(changed, problems_of_file(changed))
+    assert f"line {line}: screen_out is 0.00" in found
+
+
+@pytest.mark.parametrize("language", languages())
+def test_the_consent_text_says_who_is_paid_what_and_how_long_data_are_kept(tmp_path, language):
+    texts = {}
+    for name, more in (
+        ("unpaid", ""),
+        ("paid", "screen_out = 0.5\npartial = true\n[study.limits]\nkeep_days = 90"),
+    ):
+        changed = (
+            ("bonus_for_all = 1.0", f"bonus_for_all = 1.0\n{more}"),
+            ("minutes = 10", f'minutes = 10\nlanguage = "{language}"'),
+        )
+        study = with_text(tmp_path, one=changed[0], other=changed[1])
+        assert problems_of_file(study) == []
+        texts[name] = "\n".join(study.texts["consent"].paragraphs())
+        assert "A university" in texts[name] and "{" not in texts[name]
+    assert "0.50 USD" in texts["paid"] and "90 " in texts["paid"]
+    assert study.texts["consent"]["stop_partial"] in texts["paid"]
+    assert study.texts["consent"]["stop_unpaid"] in texts["unpaid"]
+
+
+def test_a_consent_text_that_lacks_something_is_a_problem(tmp_path):
+    (tmp_path / "texts.toml").write_text(
+        '[consent]\ntext = "You may write to {contact}. We delete data after 3 months."\n'
+    )
+    changed = with_text(tmp_path, only=("minutes = 10", 'minutes = 10\ntexts = "texts.toml"'))
+    (found,) = located(changed, problems_of_file(changed))
+    lacking = (
+        "the legal basis, the participant's rights, the pay of a participant who stops early, the controller"
+    )
+    assert f"line 21: the consent text does not name {lacking};" in found
 
 
 def test_minutes_that_contradict_the_length_are_a_problem(study):

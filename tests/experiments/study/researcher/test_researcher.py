@@ -102,12 +102,29 @@ def test_wrong_passwords_and_names_are_told_the_same_and_are_limited(site):
         texts.add((answer.status_code, answer.text))
         assert "set-cookie" not in answer.headers
     assert len(texts) == 1 and texts.pop()[0] == 403
-    for _ in range(ATTEMPTS[0] - len(tried)):
+    for _ in range(ATTEMPTS[0] - 1):
         client.post("/login", data={"name": "owner", "password": "wrong"})
     right = {"name": "owner", "password": PASSWORD}
     assert client.post("/login", data=right).status_code == 429
     elsewhere = site.client(researcher=True, headers={"X-Forwarded-For": "192.0.2.9"})
     assert elsewhere.post("/login", data=right).status_code == 303
+
+
+def test_nobody_locks_the_account_of_another_researcher(site):
+    stranger = site.client(researcher=True)
+    tried = [("owner", "wrong"), ("my password", PASSWORD)]
+    for name, password in tried:
+        assert stranger.post("/login", data={"name": name, "password": password}).status_code == 403
+    for number in range(ATTEMPTS[0] + 1):
+        elsewhere = site.client(researcher=True, headers={"X-Forwarded-For": f"192.0.2.{number + 1}"})
+        assert elsewhere.post("/login", data={"name": "owner", "password": "wrong"}).status_code == 403
+    assert site.logged_in("owner").get("/").status_code == 200
+    assert (
+        site.client(researcher=True).post("/login", data={"name": "viewer", "password": PASSWORD}).status_code
+        == 303
+    )
+    failed = [row.who for row in site.ask(site.store.audit_log()) if row.action == "login failed"]
+    assert failed == ["owner", "unknown", *["owner"] * (ATTEMPTS[0] + 1)]
 
 
 def test_a_login_has_a_new_secret_and_ends_when_it_should(site):

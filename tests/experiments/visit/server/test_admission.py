@@ -3,6 +3,7 @@
 import json
 import re
 import time
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
 import pytest
@@ -125,6 +126,20 @@ def test_where_places_fill_up_people_leave_by_the_platform_and_are_paid_by_rule(
         assert owed == {"p00003-screen_out": 50, "p00003-bonus": 150}  # a third of the reward, after a third
         leave(client, links[0])
         assert "Enough people" not in client.get("/", params=ids(3)).text, "there is a place again"
+
+
+def test_only_new_people_count_towards_the_limit_of_an_address(tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.visit.server.admission.NEW_PEOPLE", (3, 60.0))
+    recruitment = f'[study.recruitment]\nplatform = "prolific"\n{CODES}'
+    with served(tmp_path, PHASES + recruitment) as site, site.client() as client:
+        with ThreadPoolExecutor(8) as threads:
+            links = set(threads.map(lambda _: site.begin(client, **ids(0)), range(20)))
+        assert len(links) == 1, "many requests of one person at once"
+        assert {site.begin(client, **ids(number)) for number in (0, 1, 0, 2, 0, 1)} > links
+        refused = client.post("/begin", data=ids(3))
+        assert refused.status_code == 429 and 'value="person000003"' in refused.text
+        assert site.begin(client, **ids(2)), "who has begun may always return"
+    monkeypatch.undo()
 
 
 def test_a_machine_lets_in_as_many_as_its_cores_hold(monkeypatch):

@@ -36,6 +36,7 @@ PEOPLE = {
     ("POST", "/play/{token}/answers"): PARTICIPANT,
     ("GET", "/play/{token}/withdrawal"): PARTICIPANT,
     ("POST", "/play/{token}/withdrawal"): PARTICIPANT,
+    ("GET", "/play/{token}/consent.txt"): PARTICIPANT,
     ("GET", "/play/{token}/film"): PARTICIPANT,
     ("GET", "/play/{token}/floor-plan.png"): NOBODY,  # a study has no page of the result
     ("GET", "/play/{token}/ping"): EVERYBODY,  # it does nothing; the time that it takes is measured
@@ -280,6 +281,9 @@ def test_nobody_makes_people_without_end(site):
     with site.client(headers={"X-Forwarded-For": "203.0.113.1"}) as client:
         begun = [client.post("/begin").status_code for _ in range(int(NEW_PEOPLE[0]) + 1)]
         assert set(begun[:-1]) == {303} and begun[-1] == 429
+        busy = client.post("/begin")
+        assert "wait a minute and try again" in busy.text and 'action="/begin"' in busy.text
+        assert "paused" not in busy.text and busy.headers["retry-after"] == "60"
     with site.client(headers={"X-Forwarded-For": "203.0.113.2"}) as client:
         assert client.post("/begin").status_code == 303
 

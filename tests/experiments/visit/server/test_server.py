@@ -1,8 +1,10 @@
 """A study served to people: pages in order, nothing lost, repeated or skipped; trials by a scripted worker."""
 
 import dataclasses
+import hashlib
 import re
-from contextlib import contextmanager
+import sqlite3
+from contextlib import closing, contextmanager
 
 import msgspec
 import numpy as np
@@ -128,12 +130,100 @@ def test_three_wrong_comprehension_checks_end_the_study(client, study):
     link = begin(client)
     go_to(client, link, study, "comprehension")
     wrong = {**right_answers(study), "hands": "One"}
-    for _ in range(2):
-        assert "Some answers are wrong" in post(client, link, phase="comprehension", **wrong).text
-        assert phase(client, link) == "comprehension"
-    post(client, link, phase="comprehension", **wrong)
+    assert "Attempts left: 3." in client.get(link).text
+    for left in (2, 1):
+        text = send_shown(client, link, **wrong)
+        assert "Some answers are wrong" in text and f"Attempts left: {left}." in text
+        assert "You then receive no payment." in text
+    send_shown(client, link, **wrong)
     assert phase(client, link) is None
     assert "the study ends here" in client.get(link).text
+
+
+def send_shown(client, link, **answers):
+    """Send the form that is shown with answers, and return the page that follows."""
+    hidden = dict(re.findall(r'type="hidden" name="(\w+)" value="([^"]*)"', client.get(link).text))
+    answer = post(client, link, **{**hidden, **answers})
+    assert answer.status_code == 303, "a reload of the page that follows must not send the form again"
+    return client.get(answer.headers["location"]).text
+
+
+def test_a_computer_that_does_not_fit_may_be_given_up(client, study):
+    link = begin(client)
+    go_to(client, link, study, "device")
+    assert 'name="give_up"' not in client.get(link).text
+    assert "too slow" in send_shown(client, link, **{**DEVICE, "latency_ms": "9999"})
+    assert 'name="give_up"' in client.get(link).text
+    send_shown(client, link, **{**DEVICE, "latency_ms": "9999", "give_up": "yes"})
+    assert phase(client, link) is None
+
+
+@pytest.mark.parametrize("left_out", [(), ("hands",), ("hands", "speed")])
+def test_missing_answers_and_repeated_clicks_use_up_no_attempt(client, study, left_out):
+    link = begin(client)
+    go_to(client, link, study, "comprehension")
+    incomplete = {name: right for name, right in right_answers(study).items() if name not in left_out}
+    for _ in range(5 * bool(left_out)):
+        assert "missing or invalid" in send_shown(client, link, **incomplete)
+    wrong = {**right_answers(study), "hands": "One", "phase": "comprehension", "attempt": "0"}
+    for _ in range(5):  # a double click, Back and reload
+        assert post(client, link, **wrong).status_code == 303
+    assert "Attempts left: 2." in client.get(link).text
+    assert "Some answers are wrong" not in client.get(link).text, "a note is shown once"
+    post(client, link, **{**wrong, "hands": "Two"})
+    assert phase(client, link) == "comprehension", "a page that was used does not give further attempts"
+    send_shown(client, link, **right_answers(study))
+    assert phase(client, link) == "training"
+
+
+def test_the_agreement_is_kept_with_version_and_hash_of_the_text(client, study, tmp_path):
+    link = begin(client)
+    assert f'href="{link}/consent.txt"' in client.get(link).text
+    copy = client.get(f"{link}/consent.txt")
+    assert copy.headers["content-disposition"] == 'attachment; filename="consent.txt"'
+    assert all(part in copy.text for part in study.texts["consent"].paragraphs())
+    assert study.texts["consent"]["agree"] in copy.text
+    post(client, link, phase="consent", agree="yes")
+    with closing(sqlite3.connect(tmp_path / "study.db")) as database:
+        found = dict(database.execute("SELECT item, value FROM answer WHERE phase = 'consent'"))
+    digest = hashlib.sha256(copy.content).hexdigest()
+    assert found == {"agreed": "true", "text_version": '"1"', "text_sha256": f'"{digest}"'}
+
+
+@pytest.mark.parametrize(
+    ("sent", "follows", "kept"),
+    [
+        ({"played_s": "40", "film_s": "88"}, "flythrough", {}),
+        ({}, "flythrough", {}),
+        ({"played_s": "nan", "film_s": "-1"}, "flythrough", {}),
+        ({"played_s": "87.5", "film_s": "88"}, "comprehension", {"played_s": "87.5", "film_s": "88.0"}),
+        ({"played_s": "0", "film_error": "4"}, "comprehension", {"played_s": "0.0", "film_error": "4.0"}),
+    ],
+)
+def test_a_film_that_is_required_is_played(tmp_path, study, sent, follows, kept):
+    settings = msgspec.structs.replace(study.settings, require_film=True)
+    with serving(tmp_path, dataclasses.replace(study, settings=settings)) as client:
+        link = begin(client)
+        go_to(client, link, study, "flythrough")
+        assert "Press the play button" in client.get(link).text
+        text = send_shown(client, link, **{"played_s": "", "film_s": "", "film_error": "", **sent})
+        assert phase(client, link) == follows
+        assert (
+            "Please press the play button" in text.replace(study.texts["flythrough"]["required"], "")
+        ) is (follows == "flythrough")
+    with closing(sqlite3.connect(tmp_path / "study.db")) as database:
+        played = dict(database.execute("SELECT item, value FROM answer WHERE phase = 'flythrough' AND final"))
+    assert played == kept
+
+
+def test_how_much_of_the_film_was_played_is_kept_also_if_it_is_not_required(client, study, tmp_path):
+    link = begin(client)
+    go_to(client, link, study, "flythrough")
+    send_shown(client, link, played_s="12.5", film_s="88", film_error="")
+    assert phase(client, link) == "comprehension"
+    with closing(sqlite3.connect(tmp_path / "study.db")) as database:
+        played = dict(database.execute("SELECT item, value FROM answer WHERE phase = 'flythrough'"))
+    assert played == {"played_s": "12.5", "film_s": "88.0"}
 
 
 def test_answers_are_kept_as_they_are_given(client, study, tmp_path):
@@ -148,9 +238,9 @@ def test_answers_are_kept_as_they_are_given(client, study, tmp_path):
         text = later.get(link).text
         assert re.search(r'checked[^>]*name="useful"[^>]*value="2"', text)
         assert "&lt;script&gt;" in text and "<script>alert" not in text
-        refused = post(later, link, phase="survey", useful="2")
-        assert refused.status_code == 200 and "Please answer this question" in refused.text
-        assert phase(later, link) == "survey"
+        assert "Please answer this question" in send_shown(later, link, useful="3")
+        text = later.get(link).text
+        assert "Please answer" not in text and re.search(r'checked[^>]*name="useful"[^>]*value="3"', text)
 
 
 def test_a_trial_is_left_only_with_the_study(client, study):
@@ -170,7 +260,7 @@ def test_minimum_times_hold(tmp_path, study):
     )
     with serving(tmp_path, slow) as client:
         link = begin(client)
-        assert "take the time" in post(client, link, phase="consent", agree="yes").text
+        assert "take the time" in send_shown(client, link, agree="yes")
         assert phase(client, link) == "consent"
 
 
