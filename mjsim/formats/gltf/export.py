@@ -16,6 +16,7 @@ from mjsim.formats.gltf.glb import UPRIGHT, Glb, divided, pixels, texture_encode
 from mjsim.formats.gltf.shapes import Floats
 from mjsim.formats.gltf.store import SCENE
 from mjsim.formats.gltf.surfaces import GeomSurface, drawn_scene, lights_of, rounded, surfaces
+from mjsim.formats.gltf.welding import welded
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.house.compiled.house import compiled_house
@@ -154,7 +155,8 @@ class _Export:
     def _rooms(self, glb: Glb) -> list[int]:
         """Add nodes for the static geoms of each part of the house. Ceilings have nodes of their own."""
         groups: dict[tuple[bool, str], list[GeomSurface]] = {}
-        for surface, part in divided(self._by_body.get(0, []), self._scene.rooms):
+        static = welded(self._model, self._by_body.get(0, []))
+        for surface, part in divided(static, self._scene.rooms):
             groups.setdefault((surface.is_ceiling, part), []).append(surface)
         return [
             glb.mesh(f"ceiling_{part}", group, extras={"ceiling": True})
