@@ -1,5 +1,7 @@
 """Pictures show arms that join the hands to the body, and idle hands that hang at rest. The physics stays as it is."""
 
+import itertools
+
 import mujoco
 import numpy as np
 import pytest
@@ -72,7 +74,7 @@ def test_a_drawn_hand_moves_without_jumps_from_rest_to_use(scale, side):
     np.testing.assert_allclose(ways[0].hand, np.array(HANGING) * (1, side, scale))
     np.testing.assert_allclose(ways[-1].hand, rest + (IDLE_RANGE, 0, 0))
     assert ways[-1].tilt == 0
-    assert max(np.linalg.norm(b.hand - a.hand) for a, b in zip(ways, ways[1:])) < 0.03
+    assert max(np.linalg.norm(b.hand - a.hand) for a, b in itertools.pairwise(ways)) < 0.03
 
 
 def test_a_model_without_a_person_is_drawn(house_model):
