@@ -230,5 +230,7 @@ def add_language(parser: argparse.ArgumentParser) -> None:
 
 def film_config(arguments: argparse.Namespace, *, panels: bool = True) -> FilmConfig:
     """Return the settings of a film. If `panels` is False, the film does not show the panels of the HUD."""
-    make = FilmConfig.with_panels if panels else FilmConfig
-    return make(*arguments.size, arguments.profile)
+    width, height = arguments.size
+    if panels:
+        return FilmConfig.with_panels(width, height, arguments.profile)
+    return FilmConfig(width, height, arguments.profile)

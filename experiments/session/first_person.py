@@ -55,7 +55,8 @@ class FirstPersonRenderer:
     def frame(self, data: Any, state: HudState) -> NDArray[np.uint8]:
         """Render the person's view with the HUD as an RGB image, uint8, shape (height, width, 3).
 
-        `data` is the state of the scene's model. Raises RenderError if a marker cannot be drawn or the renderer is closed.
+        `data` is the state of the scene's model. Raises RenderError if a marker cannot be drawn or the renderer is
+        closed.
         """
         if state.minimap is not None and FLOORPLAN not in self._pictures:
             self._pictures[FLOORPLAN] = render_house_map(self._house.catalogue, self._house.bounds)

@@ -70,9 +70,9 @@ def test_an_idle_hand_hangs_beside_the_body_and_the_state_stays(person):
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_drawn_hand_moves_without_jumps_from_rest_to_use(scale, side):
     rest = np.array(REST) * (1, side, scale)
-    ways = [arm_pose(rest + (gap, 0, 0), rest, scale) for gap in np.linspace(0.0, IDLE_RANGE, 50)]
+    ways = [arm_pose(rest + np.array([gap, 0, 0]), rest, scale) for gap in np.linspace(0.0, IDLE_RANGE, 50)]
     np.testing.assert_allclose(ways[0].hand, np.array(HANGING) * (1, side, scale))
-    np.testing.assert_allclose(ways[-1].hand, rest + (IDLE_RANGE, 0, 0))
+    np.testing.assert_allclose(ways[-1].hand, rest + np.array([IDLE_RANGE, 0, 0]))
     assert ways[-1].tilt == 0
     assert max(np.linalg.norm(b.hand - a.hand) for a, b in itertools.pairwise(ways)) < 0.03
 
