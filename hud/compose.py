@@ -29,12 +29,13 @@ class Compositor:
         pictures: RGBA pictures by key, as uint8 of shape (s, s, 4) with straight alpha. Only the floor plan
             may have another shape. The arrays must not be modified later.
         texts: Texts of the HUD.
+        beside: True if the panels are next to the picture, which is at `picture_rect` in each frame.
 
     Raises:
         FrameError: A picture has the wrong shape or type.
     """
 
-    def __init__(self, pictures: Pictures, texts: HudTexts) -> None:
+    def __init__(self, pictures: Pictures, texts: HudTexts, *, beside: bool = False) -> None:
         for key, picture in pictures.items():
             sized = picture.ndim == 3 and min(picture.shape) > 0 and picture.shape[2] == 4
             square = sized and (picture.shape[0] == picture.shape[1] or key == FLOORPLAN)
@@ -44,6 +45,7 @@ class Compositor:
                 )
         self._stencils = Stencils(dict(pictures), 1.0)
         self._texts = texts
+        self._beside = beside
         self._layout: tuple[object, Layout] | None = None
         self._patches: dict[str, tuple[object, Patch]] = {}
 
@@ -76,13 +78,14 @@ class Compositor:
 
     def layout(self, state: HudState, width: int, height: int) -> Layout:
         """Return the layout of a HUD state's panels in a frame of the given size in pixels."""
-        unit = unit_of(width, height)
+        unit = unit_of(width, height, beside=self._beside)
         if self._stencils.unit != unit:
             self._stencils = Stencils(self._stencils.pictures, unit)
             self._patches.clear()
         key = (width, height, _without_motion(state))
         if self._layout is None or self._layout[0] != key:
-            self._layout = (key, arrange(key[2], width, height, self._stencils.typeface))
+            arranged = arrange(key[2], width, height, self._stencils.typeface, beside=self._beside)
+            self._layout = (key, arranged)
         found = self._layout[1]
         if state.pointer is None:
             return found

@@ -4,6 +4,8 @@ progress        message bar         clock
 task list                            bins
   ...             (free view)         ...
   ...              inventory          mini-map
+
+In a wide frame, the view is a picture between the panels. In other frames, the panels are over the picture.
 """
 
 import math
@@ -19,6 +21,15 @@ from hud.state import BinEntry, ChecklistItem, HudState, Message, MiniMap
 from hud.text import Typeface
 
 CONTEXT_ROWS = 2  # number of rows that stay visible above the current row
+MIN_ASPECT_BESIDE = 1.4  # minimum ratio of width to height for panels next to the picture, as on the page
+MIN_UNIT_BESIDE = 0.5  # minimum scale at which the panels next to the picture are legible
+# Margins around a picture above, below, left and right of it, in theme pixels
+_BORDERS = (
+    theme.MARGIN + theme.CHIP_HEIGHT + theme.GAP,
+    theme.GAP + theme.SLOT_HEIGHT + theme.MARGIN,
+    2 * theme.MARGIN + theme.MAX_LIST_WIDTH,
+    2 * theme.MARGIN + theme.BINS_WIDTH_BESIDE,
+)
 
 
 @dataclass(frozen=True)
@@ -47,14 +58,18 @@ class Layout:
         return self.first + len(self.rows)
 
 
-def unit_of(width: int, height: int) -> float:
-    """Return the scale, in frame pixels per theme pixel, at which 640 x 480 theme pixels fit into a frame."""
+def unit_of(width: int, height: int, *, beside: bool = False) -> float:
+    """Return the scale of the panels in a frame, in frame pixels per theme pixel.
+
+    `beside` is True if the panels are next to the picture.
+    """
     smallest = theme.MIN_FRAME
     if width < smallest[0] or height < smallest[1]:
         raise FrameError(
             f"frame of {width} x {height} px is too small for the HUD; use {smallest[0]} x {smallest[1]}"
         )
-    return min(width / 640.0, height / 480.0)
+    across, up = theme.BESIDE_FRAME if beside else theme.FRAME
+    return min(width / across, height / up)
 
 
 def margins(width: int, height: int) -> tuple[int, int, int, int]:
@@ -62,16 +77,27 @@ def margins(width: int, height: int) -> tuple[int, int, int, int]:
 
     Only long messages may extend into the picture.
     """
-    chips = theme.MARGIN + theme.CHIP_HEIGHT + theme.GAP
-    left, right = 2 * theme.MARGIN + theme.MAX_LIST_WIDTH, 2 * theme.MARGIN + theme.BINS_WIDTH_WIDE
-    hands = theme.GAP + theme.SLOT_HEIGHT + theme.MARGIN
-    unit = min(width / (640.0 - left - right), height / (480.0 - chips - hands))
-    return round(chips * unit), round(hands * unit), round(left * unit), round(right * unit)
+    top, below, left, right = _BORDERS
+    across, up = theme.BESIDE_FRAME
+    unit = min(width / (across - left - right), height / (up - top - below))
+    return round(top * unit), round(below * unit), round(left * unit), round(right * unit)
 
 
-def arrange(state: HudState, width: int, height: int, typeface: Typeface) -> Layout:
+def picture_rect(width: int, height: int) -> Rect | None:
+    """Return the area of the picture in a frame, or None if the panels are over the picture.
+
+    The panels are next to the picture if the frame is wide and large enough for legible text.
+    """
+    unit = unit_of(width, height, beside=True)
+    if width < MIN_ASPECT_BESIDE * height or unit < MIN_UNIT_BESIDE:
+        return None
+    top, below, left, right = (round(border * unit) for border in _BORDERS)
+    return Rect(left, top, width - left - right, height - top - below)
+
+
+def arrange(state: HudState, width: int, height: int, typeface: Typeface, *, beside: bool = False) -> Layout:
     """Compute the layout of all panels of a HUD state except the pointer."""
-    grid = _PanelGrid(width, height, typeface)
+    grid = _PanelGrid(width, height, typeface, beside)
     checklist, first, rows = grid.checklist(state.checklist, state.scroll)
     minimap = grid.minimap(state.minimap)
     bins, bin_rows = grid.bins(state.bins, minimap)
@@ -138,15 +164,16 @@ def _current_row(items: Sequence[ChecklistItem]) -> int:
 
 
 class _PanelGrid:
-    def __init__(self, width: int, height: int, typeface: Typeface) -> None:
+    def __init__(self, width: int, height: int, typeface: Typeface, beside: bool) -> None:
         self._width, self._height = width, height
         self._typeface, px = typeface, typeface.px
         self._px = px
         self.margin, self._gap = px(theme.MARGIN), px(theme.GAP)
         self.chip_width, self._chip_height = px(theme.CHIP_WIDTH), px(theme.CHIP_HEIGHT)
         wide = width / unit_of(width, height) >= 760
+        bins_width = theme.BINS_WIDTH_WIDE if wide else theme.BINS_WIDTH
         self._list_width = min(math.floor(theme.LIST_SHARE * width), px(theme.MAX_LIST_WIDTH))
-        self._bins_width = px(theme.BINS_WIDTH_WIDE if wide else theme.BINS_WIDTH)
+        self._bins_width = px(theme.BINS_WIDTH_BESIDE if beside else bins_width)
         self._bins_left = width - self.margin - self._bins_width
         self._top = self.margin + self._chip_height + self._gap
         self._column_height = height - px(theme.LIST_BOTTOM) - self._top

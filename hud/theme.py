@@ -1,4 +1,7 @@
-"""Colours and sizes of the HUD. Colours are sRGB from 0 to 255. Sizes are in pixels of a 640 x 480 frame.
+"""Colours and sizes of the HUD. Colours are sRGB from 0 to 255. Sizes are in theme pixels.
+
+If the panels are over the picture, a frame is 640 x 480 theme pixels. If they are next to it, a frame is
+1280 x 720 theme pixels, as wide as the page of `mjsim play`, and the picture in its middle is 832 x 624.
 
 The hues are from the Okabe-Ito palette, which people with colour-vision deficiencies can distinguish. No
 information depends on hue alone. For example, messages have symbols and completed rows are crossed out.
@@ -49,6 +52,8 @@ LABEL: Final = Face(12, 600)
 BAR: Final = Face(14, 500)
 CHIP: Final = Face(14, 600)
 
+FRAME: Final = (640, 480)  # width and height of a frame with panels over the picture
+BESIDE_FRAME: Final = (1280, 720)  # width and height of a frame with panels next to the picture
 MIN_FRAME: Final = (320, 240)  # width and height in pixels of the smallest frame with legible text
 
 MARGIN: Final = 8  # distance between the panels and the edge of the frame
@@ -77,6 +82,7 @@ TARGET: Final = 20  # side length of the receptacle's picture
 
 BINS_WIDTH: Final = 160
 BINS_WIDTH_WIDE: Final = 170  # width of the list of bins in frames wider than 4 : 3
+BINS_WIDTH_BESIDE: Final = 186  # width of the list of bins next to the picture, which makes the picture 4 : 3
 
 SLOT_WIDTH: Final = 118
 SLOT_WIDTH_LONG: Final = 133  # slot width for long object names

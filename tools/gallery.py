@@ -19,7 +19,7 @@ from experiments.record import records
 from experiments.record.phases import LeaveSession
 from experiments.record.records import EventLog
 from experiments.record.run_directory import check_file
-from experiments.session.film_config import FilmConfig
+from experiments.session.film_config import FRAME_SIZE, FilmConfig
 from experiments.session.first_person import FirstPersonRenderer
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial import run_trial
@@ -179,7 +179,7 @@ def contact_sheet(
         width: Width of a picture on the sheet in pixels.
     """
     margin, caption = width // 40, width // 12
-    height = round(width * 3 / 4)
+    height = round(width * FRAME_SIZE[1] / FRAME_SIZE[0])
     columns, rows = len(SITUATIONS), len(conditions)
     across = caption + columns * (width + margin) + margin
     sheet = np.full((caption + rows * (height + margin) + margin, across, 3), 250, dtype=np.uint8)
@@ -256,7 +256,7 @@ def make_gallery(
     for condition in CONDITIONS:
         trial = TrialConfig(objects=12, assistance=condition, seed=SEED)
         moments = [Shot(key, trial, moment) for key, (_, moment) in SITUATIONS.items()]
-        for key, frame in take_pictures(moments, FilmConfig()).items():
+        for key, frame in take_pictures(moments, FilmConfig.with_panels()).items():
             taken[condition, key] = frame
             if frames:
                 save_png(out / f"{condition}_{key}.png", frame)

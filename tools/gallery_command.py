@@ -21,12 +21,12 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the house of the levels")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the pictures")
-    add_frame(parser, size=(960, 720), profile="quality")
+    add_frame(parser, size=(1280, 720), profile="quality")
     add_force(parser)
     parser.add_argument(
         "--contact-sheet",
         action="store_true",
-        help="make only the contact sheet, from frames of 640x480 in profile fast, as in a run",
+        help="make only the contact sheet, from frames of 960x540 in profile fast, as in a run",
     )
     parser.add_argument(
         "--frames", action="store_true", help="also write the frames of the contact sheet, in full size"

@@ -32,7 +32,7 @@ def add_parser(commands: Any) -> None:
         help="length of the film, at least 1 s (default: as long as it takes at walking speed)",
     )
     add_force(parser)
-    add_frame(parser)
+    add_frame(parser, size=(640, 480))
     add_language(parser)
 
 
@@ -43,7 +43,11 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"cannot film to {arguments.out}: name a file that ends in .mp4")
     check_file(arguments.out, replace=arguments.force)
     frames = film_house(
-        arguments.house, arguments.out, film_config(arguments), arguments.seconds, arguments.language
+        arguments.house,
+        arguments.out,
+        film_config(arguments, panels=False),
+        arguments.seconds,
+        arguments.language,
     )
     print(f"{arguments.out} (frames {frames})")
     return 0

@@ -12,7 +12,7 @@ from typing import Any
 from experiments.errors import CALL_LIMIT, ConfigError
 from experiments.participants.distribution import Distributions
 from experiments.participants.registry import participant_names
-from experiments.session.film_config import FilmConfig
+from experiments.session.film_config import FRAME_SIZE, FilmConfig
 from experiments.trials.design import numbers
 from experiments.trials.trial_config import DEFAULTS, SEEDS, SETTINGS, TrialConfig, episode_settings
 from hud.conditions import CONDITIONS, OPTIONS
@@ -215,7 +215,7 @@ def trial_options(arguments: argparse.Namespace) -> dict[str, Any]:
 def add_frame(
     parser: argparse.ArgumentParser,
     *,
-    size: tuple[int, int] | None = (640, 480),
+    size: tuple[int, int] | None = FRAME_SIZE,
     profile: str = FAST.name,
     otherwise: str = "",
 ) -> None:
@@ -233,6 +233,9 @@ def add_language(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--language", default="en", metavar="LANG", help="language of the texts in the film")
 
 
-def film_config(arguments: argparse.Namespace) -> FilmConfig:
+def film_config(arguments: argparse.Namespace, *, panels: bool = True) -> FilmConfig:
+    """Return the settings of a film. If `panels` is False, the film does not show the panels of the HUD."""
     width, height = arguments.size
+    if panels:
+        return FilmConfig.with_panels(width, height, arguments.profile)
     return FilmConfig(width, height, arguments.profile)

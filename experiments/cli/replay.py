@@ -70,7 +70,7 @@ def add_parser(commands: Any) -> None:
     add_frame(
         parser,
         size=None,
-        otherwise=" (default: 640x480, or the shape of the page if a browser drew the session)",
+        otherwise=" (default: 960x540, or the shape of the page if a browser drew the session)",
     )
     add_language(parser)
     add_force(parser, "replace an existing video")
@@ -101,7 +101,9 @@ def run(arguments: argparse.Namespace) -> int:
         note_derived(arguments.directory, "film", arguments.video)
         film = ReplayFilm(
             path=arguments.video,
-            config=film_config(arguments) if arguments.size else None,
+            config=film_config(arguments, panels=arguments.camera == FIRST_PERSON)
+            if arguments.size
+            else None,
             profile=arguments.profile,
             camera=arguments.camera,
             eye=arguments.eye,

@@ -39,38 +39,43 @@ class FirstPersonRenderer:
         film: FilmConfig,
         pictures: dict[str, NDArray[np.uint8]] | None = None,
     ) -> None:
-        self._renderer = Renderer(scene.model, width=film.width, height=film.height, profile=film.profile)
+        _, _, width, height = film.view
+        self._renderer = Renderer(scene.model, width=width, height=height, profile=film.profile)
         self._house = house
         self._pictures = render_pictures(house.catalogue) if pictures is None else pictures
-        self._compositor = Compositor(self._pictures, house.texts)
         self._film = film
+        self._compositor = self._new_compositor()
 
     def camera_view(self, data: Any) -> CameraView:
         """Return the view of the eye camera. `data` is the state of the scene's model."""
         pose = self._renderer.camera_pose(data, self._camera(data))
-        width, height = self._film.width, self._film.height
+        _, _, width, height = self._film.view
         return CameraView(pose.position, pose.rotation, pose.fovy, width=width, height=height)
 
     def frame(self, data: Any, state: HudState) -> NDArray[np.uint8]:
         """Render the person's view with the HUD as an RGB image, uint8, shape (height, width, 3).
 
-        If the HUD panels are next to the picture, the image is larger than the picture. `data` is the state
-        of the scene's model. Raises RenderError if a marker cannot be drawn or the renderer is closed.
+        `data` is the state of the scene's model. Raises RenderError if a marker cannot be drawn or the renderer is
+        closed.
         """
         if state.minimap is not None and FLOORPLAN not in self._pictures:
             self._pictures[FLOORPLAN] = render_house_map(self._house.catalogue, self._house.bounds)
-            self._compositor = Compositor(self._pictures, self._house.texts)
+            self._compositor = self._new_compositor()
+        left, top, width, height = self._film.view
+        frame = np.zeros((self._film.height, self._film.width, 3), np.uint8)
         picture = self._renderer.rgb(data, self._camera(data), state.markers)
-        if self._film.beside:
-            top, below, left, right = self._film.margins
-            picture = np.pad(picture, ((top, below), (left, right), (0, 0)))
-        return self._compositor.compose(picture, state)
+        frame[top : top + height, left : left + width] = picture
+        return self._compositor.compose(frame, state)
+
+    def _new_compositor(self) -> Compositor:
+        return Compositor(self._pictures, self._house.texts, beside=self._film.picture is not None)
 
     def _camera(self, data: Any) -> str | CameraPose:
         film = self._film
         if film.field_of_view is None:
             return EYE
-        fovy = 2.0 * math.atan(math.tan(film.field_of_view / 2.0) * film.height / film.width)
+        _, _, width, height = film.view
+        fovy = 2.0 * math.atan(math.tan(film.field_of_view / 2.0) * height / width)
         return dataclasses.replace(self._renderer.camera_pose(data), fovy=fovy)
 
     def close(self) -> None:

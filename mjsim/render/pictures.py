@@ -1,5 +1,6 @@
 """Pictures of objects and receptacles, and floor plans of houses."""
 
+import copy
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,15 +9,23 @@ from typing import Any
 import cv2
 import mujoco
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.footprint import outline_points
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.scene import avatar
 from mjsim.render.cameras import ViewVolume, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import MAX_SIDE, RenderProfile
-from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, TOP_DOWN_GROUPS, Rasteriser, reduced
+from mjsim.render.rasteriser import (
+    CEILING_GROUP,
+    FIRST_PERSON_GROUPS,
+    TOP_DOWN_GROUPS,
+    Rasteriser,
+    reduced,
+)
 from mjsim.render.scene_settings import DirectionalLight
 from mjsim.values.errors import AssetError, RenderError
 
@@ -36,6 +45,9 @@ _DISTANCE = 5.0
 _PROFILE = RenderProfile("picture", skybox=False)
 _PAPER = 244  # grey level of a floor plan's background, from 0 to 255
 _HEIGHT = 10.0  # height of the camera for floor plans above the floor, in metres
+_HEADROOM = 1.8  # minimum height of the lower edge of a lintel, in metres
+_STEP = 0.05  # maximum height of rugs and door sills, in metres
+_BLOCKED = 0.2  # share of the floor below a geom above which the geom is not over a doorway
 _PLAN_LIGHTS = (DirectionalLight((0.25, -0.35, -1.0), diffuse=0.55, ambient=0.5),)
 _PLAN_PROFILE = RenderProfile("floorplan", supersampling=2.0, skybox=False)
 
@@ -163,7 +175,7 @@ def render_floorplan(
     bounds: tuple[float, float, float, float],
     pixels_per_metre: float = 60.0,
 ) -> FloorPlan:
-    """Draw a house from above, without ceilings (geom group 1) and without the person.
+    """Draw a house from above, without ceilings (geom group 1), lintels and the person.
 
     `bounds` is the area (xmin, ymin, xmax, ymax) to draw, in metres.
     """
@@ -187,6 +199,8 @@ def render_floorplan(
         far=2 * _HEIGHT,
         orthographic=True,
     )
+    model = copy.copy(model)
+    model.geom_group[_overhead_geoms(model, data)] = CEILING_GROUP
     rasteriser = Rasteriser(model, width, height, _PLAN_PROFILE, TOP_DOWN_GROUPS, _PLAN_LIGHTS)
     with rasteriser, current_context():
         rasteriser.update(data)
@@ -199,6 +213,27 @@ def render_floorplan(
 def _person_geoms(model: Any) -> NDArray[np.bool_]:
     base = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, avatar.BASE)
     return np.asarray((model.body_rootid[model.geom_bodyid] == base) & (base >= 0))
+
+
+def _overhead_geoms(model: Any, data: Any) -> NDArray[np.bool_]:
+    """Return a mask of the static geoms above head height with free floor below them, such as lintels."""
+    static = model.body_weldid[model.geom_bodyid] == 0
+    has_outline = model.geom_type > int(
+        mujoco.mjtGeom.mjGEOM_HFIELD
+    )  # all types but planes and height fields
+    solid = np.flatnonzero(static & has_outline & np.isin(model.geom_group, TOP_DOWN_GROUPS))
+    rotations = data.geom_xmat.reshape(-1, 3, 3)
+    points = [outline_points(model, int(g), data.geom_xpos[g], rotations[g]) for g in solid]
+    low, high = (np.array([end(p[:, 2]) for p in points]) for end in (np.min, np.max))
+    outlines = np.array([shapely.MultiPoint(p[:, :2]).convex_hull for p in points])
+    standing = (low < _HEADROOM) & (high > _STEP)
+    tree = shapely.STRtree(outlines[standing])
+    overhead = np.zeros(model.ngeom, dtype=bool)
+    for index in np.flatnonzero(low >= _HEADROOM):
+        below = shapely.union_all(tree.geometries[tree.query(outlines[index])])
+        blocked = shapely.area(below.intersection(outlines[index]))
+        overhead[solid[index]] = blocked <= _BLOCKED * outlines[index].area
+    return overhead
 
 
 def largest_scale(bounds: tuple[float, float, float, float]) -> float:

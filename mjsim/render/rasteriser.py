@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.render import context
+from mjsim.render.arms import Arms
 from mjsim.render.cameras import Bounds, ViewVolume, outside, without
 from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers, blend_hidden, in_view
 from mjsim.render.occlusion import BoxOccluders
@@ -24,7 +25,8 @@ from mjsim.render.scene_settings import (
 from mjsim.render.shadows import ContactShadows
 from mjsim.values.errors import RenderError
 
-FIRST_PERSON_GROUPS = (0, 1, 2)
+CEILING_GROUP = 1  # geom group of ceilings and lamps, which top-down views leave out
+FIRST_PERSON_GROUPS = (0, CEILING_GROUP, 2)
 TOP_DOWN_GROUPS = (0, 2)
 
 _Flag = mujoco.mjtRndFlag
@@ -62,7 +64,9 @@ class Rasteriser:
         self._drawn = checked_size(round(width * scale)), checked_size(round(height * scale))
         self._option = visual_option(groups, profile)
         shown = np.isin(model.geom_group, list(groups))
+        self._arms = Arms(model)
         self._bounds = Bounds.of(model)
+        self._bounds.radii[self._arms.sleeves] = 0.0  # a sleeve may become longer, so it is never culled
         self._occluders = BoxOccluders(model, self._bounds, shown)
         self._shadows = ContactShadows(model, shown) if profile.contact_shadows else None
         spots = self._shadows.count if self._shadows else 0
@@ -115,6 +119,8 @@ class Rasteriser:
         self._positions, self._rotations = data.geom_xpos.copy(), data.geom_xmat.reshape(-1, 3, 3).copy()
         category = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(self._model, data, self._option, None, self._camera, category, self._scene)
+        lengths = self._arms.pose(data, self._positions, self._rotations)
+        self._arms.place(self._scene, self._positions, self._rotations, lengths)
         if self._lights is not None:
             set_lights(self._scene, self._lights)
 

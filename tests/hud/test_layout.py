@@ -15,7 +15,7 @@ from hud.canvas import Rect
 from hud.compose import Compositor
 from hud.conditions import condition
 from hud.errors import FrameError
-from hud.layout import margins, scrolled, unit_of, visible_rows
+from hud.layout import margins, picture_rect, scrolled, unit_of, visible_rows
 from hud.messages import KINDS, message
 from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Message, MessageKind, MiniMap, Pointer
 from hud.task import Alternative
@@ -83,8 +83,8 @@ def overlap(a, b):
     return a.x < b.right and b.x < a.right and a.y < b.bottom and b.y < a.bottom
 
 
-def layout(state, size):
-    return Compositor({}, sample.TEXTS).layout(state, *size)
+def layout(state, size, *, beside=False):
+    return Compositor({}, sample.TEXTS, beside=beside).layout(state, *size)
 
 
 @pytest.mark.slow
@@ -109,16 +109,48 @@ def test_panels_are_disjoint_inside_the_frame_and_leave_the_view_free(state, siz
     assert not any(overlap(centre, rect) for name, rect in panels.items()), "what the person looks at is free"
 
 
+BESIDE = {"checklist", "bins", "progress", "clock", "inventory", "minimap"}  # never over the picture
+
+
 @settings(max_examples=40, deadline=None)
-@given(states(), st.integers(240, 1200), st.floats(1.0, 2.4))
+@given(states(), st.integers(312, 1200), st.floats(1.0, 2.4))
 def test_lists_lie_beside_a_picture_with_margins(state, height, aspect):
-    width = round(height * aspect)
+    width = max(416, round(height * aspect))
     top, below, left, right = margins(width, height)
-    found = layout(state, (left + width + right, top + height + below))
+    found = layout(state, (left + width + right, top + height + below), beside=True)
     picture = Rect(left, top, width, height)
-    beside = {"checklist", "bins", "progress", "clock", "inventory", "minimap"}
-    for name in beside & found.panels.keys():
+    for name in BESIDE & found.panels.keys():
         assert not overlap(found.panels[name], picture), name
+
+
+@settings(max_examples=40, deadline=None)
+@given(states(), st.integers(360, 1200), st.floats(1.5, 2.4))
+def test_panels_of_a_wide_frame_cover_nothing_but_its_border(state, height, aspect):
+    width = max(640, round(height * aspect))
+    picture, found = picture_rect(width, height), layout(state, (width, height), beside=True)
+    for (a, one), (b, other) in itertools.combinations(found.panels.items(), 2):
+        assert not overlap(one, other) or "pointer" in (a, b), f"{a} overlaps {b}"
+    for name in BESIDE & found.panels.keys():
+        assert not overlap(found.panels[name], picture), name
+
+
+@pytest.mark.parametrize("size", [(640, 360), (960, 540), (1280, 720), (1920, 1080)])
+@pytest.mark.parametrize("name", ["none", "highlight", "optimal", "guided"])
+def test_a_film_of_16_to_9_shows_a_view_of_4_to_3_and_reads_whole_at_the_hardest_level(name, size):
+    task = sample.task(24, steps=21, message=message("hands_full", sample.TEXTS))
+    found, picture = layout(condition(name)(task), size, beside=True), picture_rect(*size)
+    assert picture.width / picture.height == pytest.approx(4 / 3, abs=0.01)
+    assert picture.width * picture.height >= 0.55 * size[0] * size[1]
+    panels = [rect for key, rect in found.panels.items() if key != "pointer"]
+    assert sum(r.width * r.height for r in panels) <= 0.25 * size[0] * size[1]
+    lines = [line for row in (*found.rows, *found.bin_rows) for line in row.detail]
+    assert lines and not any("…" in line for line in lines)
+
+
+def test_small_and_narrow_frames_have_their_panels_over_the_picture():
+    assert (
+        picture_rect(640, 480) is None and picture_rect(480, 800) is None and picture_rect(480, 270) is None
+    )
 
 
 @pytest.mark.parametrize("base", ["highlight", "optimal"])

@@ -23,6 +23,7 @@ from mjsim.values.errors import AssetError
 from mjsim.values.person_parameters import PersonParameters
 
 MAX_WIDTH = 1280  # maximum width of a film that shows the participant's view, in pixels
+MIN_PICTURE = (416, 312)  # minimum width and height of such a film's picture, with which its text is legible
 
 Point = tuple[float, float, float]
 
@@ -182,15 +183,14 @@ def as_seen(record: Record, profile: str) -> FilmConfig:
         event for event in record.events if event["event"] == "display" and event.get("draw") == "browser"
     ]
     if not views:
-        return FilmConfig(profile=profile)
+        return FilmConfig.with_panels(profile=profile)
     width, height = views[-1]["width"], views[-1]["height"]
     scale = min(1.0, MAX_WIDTH / width)
-    return FilmConfig(
-        max(320, round(scale * width)),
-        max(240, round(scale * height)),
+    return FilmConfig.around(
+        max(MIN_PICTURE[0], round(scale * width)),
+        max(MIN_PICTURE[1], round(scale * height)),
         profile,
-        beside=True,
-        field_of_view=views[-1].get("field_of_view"),
+        views[-1].get("field_of_view"),
     )
 
 
@@ -203,8 +203,7 @@ def _open_film(replayer: Replayer, film: ReplayFilm, stack: ExitStack) -> tuple[
     )
     if film.camera == FIRST_PERSON:
         renderer = stack.enter_context(FirstPersonRenderer(scene, house, config))
-        width, height = config.frame_size
-        video = stack.enter_context(VideoWriter(path, width=width, height=height))
+        video = stack.enter_context(VideoWriter(path, width=config.width, height=config.height))
         return Filming(renderer, video), video
     camera = camera_path(film.camera, house.bounds, config.width / config.height, film.eye, film.target)
     video = stack.enter_context(VideoWriter(path, width=config.width, height=config.height))

@@ -1,6 +1,7 @@
 """Export a house for other renderers, as GLB files with a JSON index."""
 
 import json
+import math
 import re
 import zlib
 from collections.abc import Iterable, Mapping
@@ -15,11 +16,12 @@ from mjsim.formats.gltf.glb import UPRIGHT, Glb, divided, pixels, texture_encode
 from mjsim.formats.gltf.shapes import Floats
 from mjsim.formats.gltf.store import SCENE
 from mjsim.formats.gltf.surfaces import GeomSurface, drawn_scene, lights_of, rounded, surfaces
+from mjsim.formats.gltf.welding import welded
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.compiled.sites import RoomMap
-from mjsim.house.scene import avatar
+from mjsim.house.scene import arms, avatar
 from mjsim.house.scene.scene import Scene, assemble
 from mjsim.render import shadows
 from mjsim.values.episode import Episode, PlacedObject, StartPose
@@ -153,7 +155,8 @@ class _Export:
     def _rooms(self, glb: Glb) -> list[int]:
         """Add nodes for the static geoms of each part of the house. Ceilings have nodes of their own."""
         groups: dict[tuple[bool, str], list[GeomSurface]] = {}
-        for surface, part in divided(self._by_body.get(0, []), self._scene.rooms):
+        static = welded(self._model, self._by_body.get(0, []))
+        for surface, part in divided(static, self._scene.rooms):
             groups.setdefault((surface.is_ceiling, part), []).append(surface)
         return [
             glb.mesh(f"ceiling_{part}", group, extras={"ceiling": True})
@@ -176,16 +179,38 @@ class _Export:
         return (surface.within(position, rotation) for surface in found)
 
     def _person(self) -> tuple[Glb, int]:
-        """Build the hands at rest, in the frame of the person's body. The body itself is not exported."""
+        """Build the hands and sleeves, in the frame of the person's body. The body itself is not exported."""
         glb = Glb(self._images)
         base, turned, _ = self._frame(self._model.body(avatar.BODY).id)
-        hands = []
-        for hand, name in zip(avatar.HANDS, _HANDS, strict=True):
+        nodes = []
+        for number, (hand, name) in enumerate(zip(avatar.HANDS, _HANDS, strict=True)):
             body = self._model.body(name).id
             position, rotation, _ = self._frame(body)
-            mesh = glb.mesh(hand, [s.within(position, rotation) for s in self._by_body[body]])
-            hands.append(glb.node(f"{hand}_hand", [mesh], translation=((position - base) @ turned).tolist()))
-        return glb, glb.node("person", [glb.node("body", hands)], rotation=UPRIGHT)
+            sleeve = self._model.geom(f"{avatar.PREFIX}{hand}_{arms.SLEEVE}").id
+            glove = [s.within(position, rotation) for s in self._by_body[body] if s.geom != sleeve]
+            middle, along = self._data.geom_xpos[sleeve], self._data.geom_xmat[sleeve].reshape(3, 3)
+            cloth = [s.within(middle, along) for s in self._by_body[body] if s.geom == sleeve]
+            place, extras = ((position - base) @ turned).tolist(), {"arm": self._arm(number, sleeve)}
+            mesh = glb.mesh(hand, glove)
+            nodes.append(glb.node(f"{hand}_hand", [mesh], translation=place, extras=extras))
+            nodes.append(glb.node(f"{hand}_sleeve", [glb.mesh(f"sleeve_{hand}", cloth)]))
+        return glb, glb.node("person", [glb.node("body", nodes)], rotation=UPRIGHT)
+
+    def _arm(self, hand: int, sleeve: int) -> dict[str, Any]:
+        """Return the parameters with which a client poses an arm, as `arm_pose` does."""
+        eye_height = self._scene.person.eye_height
+        rest = avatar.posture(hand, avatar.REST, eye_height)
+        side = np.array([1.0, math.copysign(1.0, rest[1]), 1.0])
+        return {
+            "rest": rounded(rest),
+            **{
+                name: rounded(getattr(arms, name.upper()) * side) for name in ("hanging", "shoulder", "wrist")
+            },
+            "tilt": round(arms.HANGING_TILT, 6),
+            "range": arms.IDLE_RANGE,
+            "half": round(float(self._model.geom_size[sleeve, 1]), 6),
+            "eye_height": eye_height,
+        }
 
     def _frame(self, body: int) -> tuple[Floats, Floats, Floats]:
         data = self._data

@@ -21,6 +21,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjsim.house.scene.arms import draw_hand
 from mjsim.values.errors import AssetError
 from mjsim.values.person_parameters import PersonParameters
 
@@ -57,9 +58,6 @@ HAND_FORCE = 80.0
 # weld yields by less than 2 mm and 2 degrees, even if the object hits a door frame at walking speed.
 WELDS = {GENTLE: (0.08, 1.0, 0.95, 0.99), FIRM: (0.008, 2.0, 0.98, 0.998)}
 _TORQUESCALE = 10  # index of the torque scale in the data of a weld constraint
-_VISUAL: dict[str, Any] = {"group": 2, "contype": 0, "conaffinity": 0, "mass": 0.0}
-_GLOVE = (0.93, 0.74, 0.22, 1.0)
-_SLEEVE = (0.24, 0.34, 0.47, 1.0)
 
 
 def grip_name(hand: str, instance: str, grip: int, kind: str = FIRM) -> str:
@@ -101,7 +99,8 @@ def attach_avatar(
     body = _add_body(spec, start, person.body_radius)
     _add_head(spec, body, person)
     for number, hand in enumerate(HANDS):
-        _add_hand(spec, body, hand, posture(number, REST, person.eye_height))
+        scale = person.eye_height / PersonParameters.eye_height
+        _add_hand(spec, body, hand, posture(number, REST, person.eye_height), scale)
     _declare_welds(spec, object_names)
 
 
@@ -232,8 +231,9 @@ def _add_head(spec: mujoco.MjSpec, body: Any, person: PersonParameters) -> None:
     head.add_camera(name=EYE, pos=[EYE_FORWARD, 0, 0], quat=[0.5, 0.5, -0.5, -0.5], fovy=fovy)
 
 
-def _add_hand(spec: mujoco.MjSpec, body: Any, hand: str, position: tuple[float, float, float]) -> None:
-    side = math.copysign(1.0, position[1])
+def _add_hand(
+    spec: mujoco.MjSpec, body: Any, hand: str, position: tuple[float, float, float], scale: float
+) -> None:
     node = body.add_body(name=f"{PREFIX}{hand}_hand", pos=list(position))
     node.gravcomp = 1.0
     _set_inertia(node, 1.0, (0.002, 0.002, 0.002))
@@ -246,7 +246,7 @@ def _add_hand(spec: mujoco.MjSpec, body: Any, hand: str, position: tuple[float, 
         )
         _add_actuator(spec, f"{hand}/{axis}", kp=HAND_KP, kv=HAND_KV, force=HAND_FORCE)
     node.add_site(name=f"{PREFIX}{hand}_grip", pos=[0, 0, 0], size=[0.005, 0.005, 0.005], group=4)
-    draw_hand(node, f"{PREFIX}{hand}", side)
+    draw_hand(node, f"{PREFIX}{hand}", position, scale)
 
 
 def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
@@ -266,34 +266,3 @@ def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
                 solimp=[low, high, 0.001, 0.5, 2.0],
             )
             weld.data[_TORQUESCALE] = torque
-
-
-def draw_hand(node: Any, name: str, side: float) -> None:
-    """Add the visible glove and sleeve of a hand. `side` is 1 for the left hand and -1 for the right hand."""
-
-    def capsule(part: str, rgba: Sequence[float], radius: float, *ends: float) -> None:
-        node.add_geom(
-            name=f"{name}_{part}",
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            size=[radius, 0, 0],
-            fromto=list(ends),
-            rgba=list(rgba),
-            **_VISUAL,
-        )
-
-    node.add_geom(
-        name=f"{name}_palm",
-        type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
-        size=[0.046, 0.040, 0.019],
-        pos=[-0.012, 0, 0.030],
-        rgba=list(_GLOVE),
-        **_VISUAL,
-    )
-    for i in range(4):
-        y = side * (0.030 - 0.020 * i)
-        x = 0.052 - 0.006 * abs(i - 1)
-        capsule(f"finger_{i}", _GLOVE, 0.0095, 0.02, y, 0.030, x, y, 0.008)
-        capsule(f"tip_{i}", _GLOVE, 0.0088, x, y, 0.008, x - 0.004, y, -0.022)
-    capsule("thumb", _GLOVE, 0.0105, -0.03, -side * 0.030, 0.024, 0.012, -side * 0.048, -0.012)
-    capsule("cuff", _GLOVE, 0.033, -0.045, 0, 0.034, -0.080, side * 0.012, 0.034)
-    capsule("sleeve", _SLEEVE, 0.036, -0.080, side * 0.012, 0.034, -0.150, side * 0.040, 0.030)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import NavigablePoints, compiled_house, navigable_floor
+from mjsim.house.compiled.rays import first_hit
 from mjsim.house.scene.disorder import Disorder
 from mjsim.house.scene.settling import settle
 from mjsim.house.validation.validate import require_usable
@@ -26,6 +27,9 @@ DROP = (0.01, 0.02)  # range of heights from which objects are dropped, in metre
 PACKINGS, DRAWS = 20, 4000  # Incomplete sets of points are discarded to keep the distribution uniform.
 DROPS = 8
 MAX_POINTS = 1000
+LEAST_VIEW = 0.6  # minimum distance between the start position and a wall ahead, in metres
+CHEST = 1.2  # height at which the view ahead must be free, in metres
+HEADINGS = 16  # number of headings among which a start that faces a wall takes the one with the longest view
 RADIUS_STEP, RADII, DRAWS_PER_RADIUS = 0.25, 80, 32
 
 
@@ -102,7 +106,8 @@ def sample_episode(
         targets={o.name: catalogue.categories[o.category].receptacle for o in placed},
     )
     episode = _drop(episode, catalogue, _rng(seed, _Purpose.DROP, objects))
-    return replace(episode, start=_start(episode, navigable, _rng(seed, _Purpose.START, objects)))
+    start = _start(episode, navigable, _rng(seed, _Purpose.START, objects))
+    return replace(episode, start=replace(start, heading=_heading(start, catalogue)))
 
 
 def house_points(
@@ -235,6 +240,19 @@ def _start_candidates(
             # The square root makes the distribution uniform over the disc.
             reach, angle = radius * math.sqrt(rng.random()), rng.uniform(-math.pi, math.pi)
             yield centroid + reach * np.array([math.cos(angle), math.sin(angle)])
+
+
+def _heading(start: StartPose, catalogue: Catalogue) -> float:
+    """Return the heading of a start, or the one with the longest view if the start faces a wall."""
+    house, eye = compiled_house(catalogue), (start.x, start.y, CHEST)
+
+    def view(heading: float) -> float:
+        return first_hit(house.model, house.data, eye, (math.cos(heading), math.sin(heading), 0.0))[0]
+
+    if view(start.heading) >= LEAST_VIEW:
+        return start.heading
+    turns = (math.remainder(start.heading + k * math.tau / HEADINGS, math.tau) for k in range(HEADINGS))
+    return max(turns, key=view)
 
 
 def _can_start(point: NDArray[np.float64], objects: NDArray[np.float64], navigable: NavigablePoints) -> bool:

@@ -1,4 +1,4 @@
-"""The floor plan's scale is exact, and ceilings do not hide the rooms."""
+"""The floor plan's scale is exact, and neither ceilings nor lintels hide what is below them."""
 
 import copy
 
@@ -6,6 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from mjsim.generator.home_cache import load_catalogue
+from mjsim.generator.recipe import floor_plan_of
+from mjsim.house.compiled.house import compiled_house
 from mjsim.render import largest_scale, render_floorplan
 from mjsim.values.errors import RenderError
 
@@ -110,3 +113,53 @@ def test_objects_of_the_apartment_lie_where_the_plan_says(scene):
     apart = np.linalg.norm(places[:, None] - magenta[None], axis=2)
     assert apart.min(axis=1).max() < 0.1 * 40
     assert apart.min(axis=0).max() < 0.35 * 40  # and magenta is nowhere else
+
+
+WALL = """<mujoco><worldbody>
+  <geom type="box" size="2 1 .05" pos="2 1 -.05" rgba="1 1 1 1"/>
+  <geom type="box" size=".75 .05 1.2" pos=".75 1 1.2" rgba="0 0 1 1"/>
+  <geom type="box" size=".75 .05 1.2" pos="3.25 1 1.2" rgba="0 0 1 1"/>
+  <geom type="box" size=".5 .05 .2" pos="2 1 2.2" rgba="0 0 1 1"/>
+  <geom type="box" size=".02 .5 1" pos="1.53 .55 1" rgba="0 1 0 1"/>
+  <geom type="box" size=".5 .05 .4" pos="2 1 {height}" rgba="1 0 0 1"/>
+</worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(("height", "open_passage"), [(-9.0, True), (0.4, False)])
+def test_a_lintel_is_left_out_over_a_passage_but_not_over_a_parapet(height, open_passage):
+    """A door that stands open in the passage does not close it, and what is below a lintel is drawn."""
+    model = mujoco.MjModel.from_xml_string(WALL.format(height=height))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    plan = render_floorplan(model, data, (0.0, 0.0, 4.0, 2.0), 50)
+    (left, top), (right, bottom) = plan.to_pixels([(1.6, 1.04), (2.45, 0.96)]).round().astype(int)
+    assert coloured(plan.rgb, 2)[top:bottom, left:right].any() != open_passage
+    assert coloured(plan.rgb, 2)[top:bottom, : plan.to_pixels([(1.45, 1.0)]).astype(int)[0, 0]].all()
+
+
+def doorways(name, model):
+    """Yield the middle of each inner doorway of a house, in metres."""
+    if name == "apartment":
+        frames = [model.geom(i) for i in range(model.ngeom) if "/doorway_" in model.geom(i).name]
+        yield from (frame.pos[:2] for frame in frames if frame.name.endswith("_top"))
+        return
+    plan = floor_plan_of(load_catalogue(name).house_path)
+    for door in plan.doors:
+        if not door.is_front:
+            room = plan.room(door.rooms[0])
+            wall = room.floor.along(door.side_in(room.key), door.center - 0.1, door.center + 0.1, -0.06, 0.0)
+            yield np.array(wall.center)
+
+
+@pytest.mark.parametrize("name", ["apartment", "generated:3?rooms=4"])
+def test_doorways_show_the_floor_on_which_one_walks(name):
+    house = compiled_house(load_catalogue(name))
+    bounds, scale = house.rooms.bounds, 50.0
+    floors = copy.copy(house.model)
+    floors.geom_group[house.data.geom_xpos[:, 2] > 0.05] = 3
+    plans = [render_floorplan(model, house.data, bounds, scale) for model in (house.model, floors)]
+    middles = np.array(list(doorways(name, house.model)))
+    assert len(middles) >= 3
+    for column, row in plans[0].to_pixels(middles).astype(int):
+        drawn, floor = (plan.rgb[row - 2 : row + 3, column - 2 : column + 3].astype(int) for plan in plans)
+        assert np.abs(drawn - floor).max() < 40, "but for a shadow, the floor"

@@ -153,7 +153,7 @@ export class DrawnView {
       const pose = this.#poses.at(name, now / 1000, this.#body);
       if (pose) this.world.setPose(name, pose);
     }
-    this.world.setPerson({ x, y, heading, hands: state.hands });
+    this.world.setPerson({ x, y, heading, hands: state.hands, eyeHeight: scene.gait.eye_height });
     const eye = eyeOf(this.#body, scene.gait);
     if (this.calm) eye.heading = SNAP * Math.round(heading / SNAP);
     if (!this.headset?.place(eye.position)) this.world.setEye(eye);

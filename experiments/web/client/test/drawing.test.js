@@ -59,6 +59,12 @@ function url(type, bytes) {
   return `data:${type};base64,${btoa(String.fromCharCode(...bytes))}`;
 }
 
+/** @param {number} side 1 for the left arm */
+const armOf = (side) => ({
+  rest: [0.3, 0.2 * side, 1], hanging: [0, 0.2 * side, 0.8], shoulder: [0, 0.2 * side, 1.4], wrist: [-0.1, 0, 0],
+  tilt: Math.PI / 2, range: 0.1, half: 0.2, eye_height: 1.6,
+});
+
 /** @type {Record<string, string>} */
 const FILES = {
   "scene.json": url("application/json", new TextEncoder().encode(JSON.stringify({
@@ -66,7 +72,10 @@ const FILES = {
     objects: { mug: { file: "mug.glb", label: "Mug", bounds: [], boxes: [[0, 0, 0.05, 0.04, 0.04, 0.05, 1, 0, 0, 0]] } },
   }))),
   "house.glb": glb([{ name: "static_kitchen" }, { name: "lamps", extras: { ceiling: true } }], { lights: [LIGHT, SPOT], headlight: HEADLIGHT }),
-  "person.glb": glb([{ name: "left_hand" }, { name: "right_hand" }]),
+  "person.glb": glb([1, -1].flatMap((side) => [
+    { name: side > 0 ? "left_hand" : "right_hand", extras: { arm: armOf(side) } },
+    { name: side > 0 ? "left_sleeve" : "right_sleeve" },
+  ])),
   "mug.glb": glb([{ name: "object" }]),
 };
 
@@ -160,10 +169,26 @@ describe("the eye", () => {
   });
 });
 
-test("the hands are in the frame of the body", () => {
-  world.setPerson({ x: 1, y: 2, heading: Math.PI / 2, hands: [[0.3, 0.2, 1], [0.3, -0.2, 1]] });
-  expect(placed(part("left_hand"))).toEqual([0.8, 2.3, 1]);
-  expect(placed(part("right_hand"))).toEqual([1.2, 2.3, 1]);
+describe("the arms", () => {
+  test("join hands that are in use with the shoulders, in the frame of the body", () => {
+    world.setPerson({ x: 1, y: 2, heading: Math.PI / 2, hands: [[0.6, 0.2, 1.4], [0.9, -0.2, 0.5]] });
+    expect(placed(part("left_hand"))).toEqual([0.8, 2.6, 1.4]);
+    expect(placed(part("right_hand"))).toEqual([1.2, 2.9, 0.5]);
+    const ends = (/** @type {string} */ name) => [-0.2, 0.2].map((z) => placed(part(name), [0, 0, z]));
+    expect(ends("left_sleeve")).toEqual([[0.8, 2.5, 1.4], [0.8, 2, 1.4]]);
+    expect(ends("right_sleeve")).toEqual([[1.2, 2.8, 0.5], [1.2, 2, 1.4]]);
+  });
+
+  test("hang at rest while the hands are idle, at the height of the person", () => {
+    world.setPerson({ x: 1, y: 2, heading: 0, hands: [[0.3, 0.2, 1], [0.3, -0.2, 1.05]] });
+    expect(placed(part("left_hand"))).toEqual([1, 2.2, 0.8]);
+    expect(placed(part("left_hand"), [0.1, 0, 0])).toEqual([1, 2.2, 0.7]); // fingers point down
+    expect(placed(part("left_sleeve"), [0, 0, -0.2])).toEqual([1, 2.2, 0.9]);
+    const [, , half = 0] = placed(part("right_hand"));
+    expect(half).toBeCloseTo(0.95); // halfway between both postures
+    world.setPerson({ x: 1, y: 2, heading: 0, hands: [[0.3, 0.2, 0.5], [0, 0, 1]], eyeHeight: 0.8 });
+    expect(placed(part("left_hand"))).toEqual([1, 2.2, 0.4]);
+  });
 });
 
 describe("objects", () => {

@@ -412,7 +412,7 @@ def test_another_view_of_the_same_run(film, house, tmp_path, options):
     ("draw", "view", "frame"),
     [
         ("browser", (1500, 750), (1280, 640)),
-        ("browser", (200, 100), (320, 240)),
+        ("browser", (200, 100), (416, 312)),
         ("server", (1500, 750), None),
     ],
 )
@@ -420,12 +420,14 @@ def test_a_film_has_the_shape_of_the_page(run, draw, view, frame):
     display = {"event": "display", "draw": draw, "width": view[0], "height": view[1], "field_of_view": 1.9}
     log = json.dumps(display).encode() + b"\n"
     config = as_seen(dataclasses.replace(read_run(run), log=log), "draft")
-    assert (config.beside, config.profile) == (frame is not None, "draft")
+    left, top, width, height = config.view
+    assert config.profile == "draft" and config.width % 2 == 0 and config.height % 2 == 0
+    assert 0 < left < config.width - width and 0 < top < config.height - height
     if frame is None:
-        assert config.frame_size == (640, 480)
-        return
-    assert (config.width, config.height, config.field_of_view) == (*frame, 1.9)
-    assert config.frame_size > frame and all(side % 2 == 0 for side in config.frame_size)
+        assert config == FilmConfig.with_panels(profile="draft")
+        assert (config.width, config.height) == (960, 540) and 3 * width == 4 * height
+    else:
+        assert (width, height, config.field_of_view) == (*frame, 1.9)
 
 
 def test_a_replay_that_fails_leaves_no_film(film, house, tmp_path):

@@ -54,10 +54,10 @@ def test_the_film_shows_what_the_window_showed(tmp_path, chromium_page, width, h
     replay(run, film=ReplayFilm(film, None))
     config = as_seen(read_run(run), "fast")
     assert config.field_of_view == (degrees and pytest.approx(np.deg2rad(degrees)))
-    assert seen.shape == (config.height, config.width, 3), "the film has the shape of the view"
+    left, top, width, height = config.view
+    assert seen.shape == (height, width, 3), "the film has the shape of the view"
     with av.open(str(film)) as video:
         *_, last = video.decode(video=0)
-    top, _, left, _ = config.margins
-    frame = last.to_ndarray(format="rgb24")[top : top + config.height, left : left + config.width]
+    frame = last.to_ndarray(format="rgb24")[top : top + height, left : left + width]
     np.savez(tmp_path / "pictures.npz", seen=seen, frame=frame)  # to be looked at
     assert ssim(seen, frame) >= LEAST

@@ -181,11 +181,18 @@ def test_hands_hang_on_the_body(files):
     (body,) = person.root["children"]
     nodes = person.gltf["nodes"]
     hands = [nodes[child] for child in nodes[body]["children"]]
-    assert [hand["name"] for hand in hands] == ["left_hand", "right_hand"]
-    left, right = (matrix_of(hand)[:3, 3] for hand in hands)
+    assert [part["name"] for part in hands] == ["left_hand", "left_sleeve", "right_hand", "right_sleeve"]
+    left, right = (matrix_of(hand)[:3, 3] for hand in hands[::2])
     np.testing.assert_allclose(left * [1, -1, 1], right)
     for part in person.parts():
-        assert np.abs(part.positions - (left if part.node == "left" else right)).max() < 0.25
+        if not part.node.startswith("sleeve"):
+            assert np.abs(part.positions - (left if part.node == "left" else right)).max() < 0.25
+    for hand, sleeve in ((hands[0], "sleeve_left"), (hands[2], "sleeve_right")):
+        arm = hand["extras"]["arm"]
+        (cloth,) = (part.positions for part in person.parts() if part.node == sleeve)
+        rest = np.linalg.norm(np.subtract(arm["shoulder"], np.add(arm["rest"], arm["wrist"]))) / 2
+        assert arm["half"] == pytest.approx(rest, abs=1e-5), "from the wrist to the shoulder at rest"
+        assert np.ptp(cloth[:, 2]) == pytest.approx(2 * (rest + 0.036), abs=1e-3)
 
 
 def test_scene_json_says_what_else_is_drawn(catalogue, files, scene_json):

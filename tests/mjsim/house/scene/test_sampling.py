@@ -15,6 +15,9 @@ from hypothesis import strategies as st
 from small_worlds import episode_of
 
 from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.house import compiled_house
+from mjsim.house.compiled.rays import first_hit
+from mjsim.house.scene import sampling
 from mjsim.house.scene.sampling import sample_episode, sample_points
 from mjsim.house.scene.settling import settle
 from mjsim.values.errors import SamplingError
@@ -220,3 +223,23 @@ def test_object_that_rolls_away_is_an_error(small_house, tmp_path):
     draughty = Catalogue.load(str(tmp_path / "catalogue.toml"))
     with pytest.raises(SamplingError, match=r"'ball'.*rolled"):
         sample_episode(draughty, Floor(), objects=4, seed=0, points=4)
+
+
+def test_a_start_that_would_face_a_wall_faces_the_longest_view_and_others_stay(catalogue, navmesh):
+    """Headings that see at least 0.6 m are those of the seed, and all starts see that far."""
+    compiled, turned = compiled_house(catalogue), 0
+    for seed in range(40):
+        start = sample_episode(catalogue, navmesh, objects=2, seed=seed).start
+        drawn = float(sampling._rng(seed, sampling._Purpose.HEADING).uniform(-math.pi, math.pi))
+        rays = {h: (math.cos(h), math.sin(h), 0.0) for h in (start.heading, drawn)}
+        free = {
+            h: first_hit(compiled.model, compiled.data, (start.x, start.y, 1.2), ray)[0]
+            for h, ray in rays.items()
+        }
+        assert free[start.heading] >= sampling.LEAST_VIEW
+        if free[drawn] >= sampling.LEAST_VIEW:
+            assert start.heading == drawn
+        else:
+            turned += 1
+            assert free[start.heading] > 1.5, "no wall is near in at least one direction"
+    assert 0 < turned < 15

@@ -1,6 +1,7 @@
 // Draws the house, its objects and the person with WebGL 2. Everything is in the house frame: metres, z up.
 
 import { Group, LinearSRGBColorSpace, Scene, WebGLRenderer } from "../vendor/three.js";
+import { Arm } from "./arms.js";
 import { HouseCamera } from "./camera.js";
 import { lighting } from "./house_material.js";
 import { Markers } from "./markers.js";
@@ -16,7 +17,8 @@ import { Things } from "./things.js";
 /** @import { Resolve, SceneFile } from "./scene_files.js" */
 /** @import { Pose, Thing } from "./things.js" */
 /**
- * @typedef {{ x: number; y: number; heading: number; hands: number[][] }} Person left and right hand in the body's frame
+ * @typedef {{ x: number; y: number; heading: number; hands: number[][]; eyeHeight?: number }} Person left and right hand
+ *   in the body's frame
  * @typedef {{ calls: number; triangles: number; textures: number; milliseconds: number; renderer: string }} Info of the
  *   last frame: draw calls, triangles, textures in use, time of the main thread; and what draws
  */
@@ -37,8 +39,8 @@ export class World3D {
   #milliseconds = 0;
   /** @type {Object3D[]} */
   #ceilings = [];
-  /** @type {(Object3D | undefined)[]} */
-  #hands = [];
+  /** @type {Arm[]} */
+  #arms = [];
   /** @type {Things | null} */
   #things = null;
   /** @type {Markers | null} */
@@ -75,7 +77,10 @@ export class World3D {
     for (const { group } of [house, person]) dress(group, light);
     this.#ceilings = [];
     house.group.traverse((part) => part.userData["ceiling"] && this.#ceilings.push(part));
-    this.#hands = ["left_hand", "right_hand"].map((name) => person.group.getObjectByName(name));
+    this.#arms = ["left", "right"].flatMap((side) => {
+      const [hand, sleeve] = ["hand", "sleeve"].map((name) => person.group.getObjectByName(`${side}_${name}`));
+      return hand && sleeve ? [new Arm(hand, sleeve, /** @type {any} */ (hand.userData["arm"]))] : [];
+    });
     const shadows = spot && round ? new ContactShadows(light, spot, round) : null;
     const read = async (/** @type {string} */ name) => {
       const { group } = await readModel(resolve(name));
@@ -156,15 +161,12 @@ export class World3D {
   }
 
   /** @param {Person} person */
-  setPerson({ x, y, heading, hands }) {
+  setPerson({ x, y, heading, hands, eyeHeight }) {
     this.#person.position.set(x, y, 0);
     this.#person.rotation.z = heading;
     this.#person.updateMatrix();
     this.#person.matrixWorldNeedsUpdate = true;
-    for (const [side, hand] of this.#hands.entries()) {
-      hand?.position.fromArray(hands[side] ?? [0, 0, 0]);
-      hand?.updateMatrix();
-    }
+    for (const [side, arm] of this.#arms.entries()) arm.pose(hands[side] ?? [0, 0, 0], eyeHeight);
   }
 
   /** @param {Marker[]} markers */

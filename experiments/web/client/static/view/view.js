@@ -58,7 +58,7 @@ function draw() {
   const { step, share } = run.at(time);
   const [x = 0, y = 0, heading = 0, pitch = 0] = run.body(step, share);
   for (const { name, pose } of run.poses(step, share)) world.setPose(name, pose);
-  world.setPerson({ x, y, heading, hands: run.hands(step, share) });
+  world.setPerson({ x, y, heading, hands: run.hands(step, share), eyeHeight: recorded.person.eye_height });
   const eye = eyeOf([x, y, heading, pitch], recorded.person);
   if (headset.place(eye.position)) headset.show(run.hud(step), run.hud(step).clock);
   else if (camera === "person") world.setEye(eye);
