@@ -10,7 +10,7 @@ import msgspec
 from msgspec.structs import replace
 
 from experiments.record.phases import STORY, TRAINING
-from experiments.session.familiarise import story_text
+from experiments.session.familiarise import story_text, with_names
 from experiments.trials.training import trials_of
 from experiments.trials.trial_config import MAX_SEED, TrialConfig
 from experiments.visit.plan import COMPREHENSION, RESULT, Device, Limits, VisitPlan
@@ -18,6 +18,7 @@ from experiments.visit.recruiter import OpenLink
 from experiments.visit.store import Assignment, CellQuota
 from experiments.visit.texts import Section, read_texts, story_file
 from experiments.visit.texts.items import Item
+from mjsim.generator.home_cache import load_catalogue
 
 NAME = "play"  # name under which `mjsim play` stores its study in the database
 MINUTES = 15.0
@@ -39,9 +40,10 @@ def _texts(language: str, questions: tuple[Item, ...]) -> dict[str, Section]:
     return texts
 
 
-def _story(arguments: argparse.Namespace, words: Section, assistance: str, phases: Sequence[str]) -> str:
+def _story(arguments: argparse.Namespace, words: Section, task: TrialConfig, phases: Sequence[str]) -> str:
     if STORY not in phases:
         return ""
+    assistance = str(task.assistance).split("-")[0]
     path = arguments.story or story_file(arguments.language)
     shown = {
         "story_list": True,
@@ -50,7 +52,8 @@ def _story(arguments: argparse.Namespace, words: Section, assistance: str, phase
         "story_training": TRAINING in phases,
     }
     more = [words[name] for name, is_shown in shown.items() if is_shown]
-    return "\n\n".join([story_text(None if path is None else Path(path)), *more])
+    catalogue = load_catalogue(task.house).in_language(arguments.language)
+    return "\n\n".join([with_names(story_text(None if path is None else Path(path)), catalogue), *more])
 
 
 def plan_of_play(
@@ -78,7 +81,7 @@ def plan_of_play(
         arguments.language,
         tuple(shown),
         texts,
-        _story(arguments, texts["play"], str(task.assistance).split("-")[0], shown),
+        _story(arguments, texts["play"], task, shown),
         arguments.minimum,
         frozenset(),
         Limits(

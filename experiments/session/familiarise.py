@@ -10,6 +10,9 @@ from experiments.house import House
 from experiments.record.phases import FLYTHROUGH, STORY, TRAINING
 from experiments.record.records import PHASE_BEGUN, PHASE_ENDED, Event, EventLog
 from experiments.session.camera_path import bins_seen, camera_path
+from hud.lists import in_sentence
+from hud.texts import filled
+from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.sight.sight import FieldOfView
 from mjsim.support.files import read_text
 from mjsim.values.person_parameters import PersonParameters
@@ -61,14 +64,17 @@ def _phases(
     phases: Collection[str], story: str | None, house: House, person: PersonParameters
 ) -> Iterator[dict[str, Any]]:
     if STORY in phases:
-        text = story_text(None if story is None else Path(story))
+        text = with_names(story_text(None if story is None else Path(story)), house.catalogue)
         yield {"phase": STORY, "duration_s": round(reading_time(text), 6)}
     if FLYTHROUGH in phases:
         yield watch_flythrough(house, person)
 
 
 def story_text(path: Path | None = None) -> str:
-    """Read the story from a UTF-8 file, or the default story. Blank lines separate paragraphs."""
+    """Read the story from a UTF-8 file, or the default story. Blank lines separate paragraphs.
+
+    Names of bins are still placeholders (see `with_names`).
+    """
     file = path or STORY_FILE
     try:
         text = read_text(file).strip()
@@ -79,6 +85,19 @@ def story_text(path: Path | None = None) -> str:
     if not text:
         raise ConfigError(f"the story {file} is empty; write at least one sentence")
     return text
+
+
+def with_names(story: str, catalogue: Catalogue) -> str:
+    """Fill in the bins of a house and the categories of its objects, in the language of the catalogue.
+
+    `{bins}` and `{categories}` are lists of labels within a sentence ("dish bin, toy box"). `{Bins}` and
+    `{Categories}` list the labels themselves ("Dish bin, Toy box"). `{count}` is the number of bins.
+    """
+    named = {"bins": catalogue.receptacles, "categories": catalogue.categories}
+    labels = {name: [entry.label for entry in entries.values()] for name, entries in named.items()}
+    inside = {name: ", ".join(map(in_sentence, found)) for name, found in labels.items()}
+    plain = {name.capitalize(): ", ".join(found) for name, found in labels.items()}
+    return filled(story, count=len(catalogue.receptacles), **inside, **plain)
 
 
 def reading_time(text: str) -> float:

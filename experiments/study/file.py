@@ -135,7 +135,7 @@ class Study:
     settings: StudySettings
     cells: Sequence[Cell]
     texts: Texts
-    story: str
+    story: str  # text with placeholders for the bins of the house
     exclusions: Exclusions | None
     rehearsal: bool = False  # True if all participants are simulated
 

@@ -8,12 +8,14 @@ from typing import Any
 import msgspec
 
 from experiments.record.phases import REHEARSAL
+from experiments.session.familiarise import with_names
 from experiments.study.file import Study
 from experiments.study.recruitment import recruiter
 from experiments.trials.training import trials_of
 from experiments.visit.plan import PLAYED, VisitPlan
 from experiments.visit.recruiter import Recruiter
 from experiments.visit.store import Assignment, CellQuota
+from mjsim.generator.home_cache import load_catalogue
 
 
 def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None = None) -> VisitPlan:
@@ -43,7 +45,9 @@ def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None =
         settings.language,
         settings.phases,
         study.texts,
-        study.story,
+        with_names(
+            study.story, load_catalogue(study.cells[0].trials[0].house).in_language(settings.language)
+        ),
         {**settings.minimum, **endless},
         frozenset(settings.optional),
         settings.limits,

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+import cv2
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,10 @@ MAX_MARKERS = 1024
 _EMITTED = 0.62
 _LIT = 0.32
 _HIDDEN_OPACITY = 0.3  # opacity of an x-ray marker that is behind other geoms
+# Lines around an x-ray marker that is behind other geoms, from the inside to the outside. Every colour has a contrast
+# of at least 3 : 1 to one of these two tones (WCAG 2.2, 1.4.11).
+LINES: tuple[tuple[int, int, int], ...] = ((8, 15, 51), (242, 242, 242))
+LINE_WIDTH = 0.0025  # width of each line as a fraction of the picture's height
 _AMBIENT = 0.3  # ambient light that MuJoCo adds to a scene without lights
 _DEPTH_TOLERANCE = 1e-4  # relative tolerance for rounding errors when the depths of two passes are compared
 _OUTLINE = 1.4  # radius of an outline as a multiple of the sphere's radius
@@ -108,6 +113,25 @@ def blend_hidden(
     hidden = (marker_depth > 0) & (marker_depth < scene_depth * (1 - _DEPTH_TOLERANCE))
     mixed = frame[hidden] * (1 - _HIDDEN_OPACITY) + colour[hidden] * _HIDDEN_OPACITY
     frame[hidden] = np.round(mixed).astype(np.uint8)
+
+
+def outline_hidden(
+    frame: NDArray[np.uint8], scene_depth: NDArray[np.float32], marker_depth: NDArray[np.float32]
+) -> None:
+    """Draw lines in place around markers that are behind other geoms. Arguments are as for `blend_hidden`."""
+    taken = marker_depth > 0
+    left, top, width, height = cv2.boundingRect(taken.view(np.uint8))
+    if not width:
+        return
+    side = max(1, round(LINE_WIDTH * frame.shape[0]))
+    margin = side * len(LINES)
+    area = np.s_[max(0, top - margin) : top + height + margin, max(0, left - margin) : left + width + margin]
+    depth, taken = marker_depth[area], taken[area]
+    for colour in LINES:
+        depth = cv2.dilate(depth, np.ones((2 * side + 1, 2 * side + 1), np.uint8))
+        line = (depth > 0) & (depth < scene_depth[area] * (1 - _DEPTH_TOLERANCE)) & ~taken
+        frame[area][line] = colour
+        taken = taken | line
 
 
 def in_view(view: ViewVolume, aspect: float, markers: Sequence[MarkerLike]) -> list[MarkerLike]:

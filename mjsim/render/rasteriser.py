@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mjsim.render import context
 from mjsim.render.arms import Arms
 from mjsim.render.cameras import Bounds, ViewVolume, outside, without
-from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers, blend_hidden, in_view
+from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers, blend_hidden, in_view, outline_hidden
 from mjsim.render.occlusion import BoxOccluders
 from mjsim.render.profiles import RenderProfile
 from mjsim.render.scene_settings import (
@@ -228,6 +228,7 @@ class Rasteriser:
         colour = np.empty_like(self._colour)
         self._draw(scene, self._drawn, colour, marker_depth)
         blend_hidden(self._colour, colour, scene_depth, marker_depth)
+        outline_hidden(self._colour, scene_depth, marker_depth)
 
 
 def reduced(drawn: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:

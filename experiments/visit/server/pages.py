@@ -70,6 +70,8 @@ class VisitPages:
         section = self._plan.texts.get(name)
         return {
             "step": step.replace("{steps}", str(self._steps)),
+            "number": now.number,
+            "steps": self._steps,
             "path": now.visitor.path,
             "phase": name,
             "wait": now.wait,

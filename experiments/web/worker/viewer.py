@@ -20,8 +20,9 @@ from experiments.web.worker.snapshots import SnapshotStream, field_of_view, scen
 from hud.projection import CameraView, project
 from hud.state import HudState
 from mjsim.house.scene.avatar import eye_position
+from mjsim.house.sight.sight import FieldOfView, visible_objects
 from mjsim.values.actions import Pick
-from mjsim.values.observation import Observation
+from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.values.person_parameters import PICTURE_ASPECT
 from mjsim.world.world import World
 
@@ -44,6 +45,7 @@ class BrowserViewer(Viewer):
         self._step = -1  # control step of the last snapshot
         self._looked = -HUD_EVERY  # control step of the last HUD update
         self._glance: object = None  # state at the last HUD update
+        self._noticed: set[str] = set()  # objects that have been in the picture
 
     def set_view(self, view: View | None) -> None:
         """Send the complete state to a new connection. If `view` is None, keep the previous view."""
@@ -112,6 +114,8 @@ class BrowserViewer(Viewer):
             self._send(snapshots.next(seen, step))
 
     def _begin(self, view: View, live: LiveSession) -> None:
+        if self._shown_to is None or self._shown_to[1] is not live:
+            self._noticed.clear()
         self._shown_to, self._shown, self._step, self._snapshots = (view, live), None, -1, None
         self._sent.clear()
         if view.codec == "none":
@@ -134,13 +138,18 @@ class BrowserViewer(Viewer):
         return Moment(step, clock, room, self._reach(live, seen), state.pointer, state.minimap)
 
     def _reach(self, live: LiveSession, seen: Observation) -> Reach | None:
+        if (camera := self.camera(live.world)) is None:
+            return None
+        self._notice(live, seen, camera)
         result = live.world.answer(act(live.world.answer))
-        if not result.applied or result.object is None or (camera := self.camera(live.world)) is None:
+        if not result.applied or result.object is None:
             return None
         catalogue, episode = live.shown.catalogue, live.scene.episode
         model = next(item.model for item in episode.objects if item.name == result.object)
         place: Any
         if isinstance(result.action, Pick):
+            if result.object not in self._noticed:
+                return None
             receptacle, place = None, seen.object_positions[seen.object_names.index(result.object)]
         else:
             key = episode.targets[result.object]
@@ -150,6 +159,17 @@ class BrowserViewer(Viewer):
         in_view = depth > 0.0 and all(0.0 <= share <= 1.0 for share in at)
         label, (px, py, pz) = catalogue.objects[model].label, np.round(place, 4).tolist()
         return Reach(label, receptacle, at if in_view else None, result.object, (px, py, pz))
+
+    def _notice(self, live: LiveSession, seen: Observation, camera: CameraView) -> None:
+        """Remember the objects that are in the picture now."""
+        loose = set(seen.names_with(ObjectStatus.LOOSE)) - self._noticed
+        if loose:
+            horizontal = 2.0 * math.atan(math.tan(camera.fovy / 2.0) * camera.width / camera.height)
+            field = FieldOfView(horizontal, camera.fovy, live.scene.person.viewing_distance)
+            pose = seen.eye, seen.heading, seen.pitch
+            self._noticed.update(
+                visible_objects(live.scene, live.world.data, *pose, field=field, among=loose)
+            )
 
 
 def page_hud(state: HudState) -> Hud:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 from collections import Counter
 
 import av
@@ -18,7 +19,7 @@ from experiments.record.metrics import measure
 from experiments.record.phases import PHASES
 from experiments.record.records import read_events
 from experiments.session.camera_path import SPEED, STEP, bins_seen, camera_path
-from experiments.session.familiarise import reading_time, story_text
+from experiments.session.familiarise import reading_time, story_text, with_names
 from experiments.session.film import write_flythrough
 from experiments.session.film_config import FilmConfig
 from experiments.trials.design import read_design
@@ -27,6 +28,7 @@ from experiments.trials.setup import simulated_user
 from experiments.trials.training import training_config
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
+from experiments.visit.texts import languages, story_file
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.sight.sight import FieldOfView, visible_receptacles
 from mjsim.render import CameraPose, Renderer
@@ -153,6 +155,26 @@ def test_a_story_of_ones_own_is_read(tmp_path):
     with pytest.raises(ConfigError, match="cannot read the story"):
         story_text(tmp_path / "missing")
     assert len(story_text().split()) > 50
+
+
+@pytest.mark.parametrize("language", languages())
+def test_the_story_names_the_bins_of_the_house_and_no_others(language, house):
+    """A home may have fewer bins than the apartment; the words are those of the lists on the display."""
+    everything = house.catalogue.in_language(language)
+    kept = {k: c for k, c in everything.categories.items() if k in ("dishes", "laundry")}
+    bins = {c.receptacle: everything.receptacles[c.receptacle] for c in kept.values()}
+    fewer = dataclasses.replace(everything, categories=kept, receptacles=bins)
+    for catalogue in (everything, fewer):
+        text = with_names(story_text(story_file(language)), catalogue)
+        for entries in ("categories", "receptacles"):
+            labels = {entry.label.lower() for entry in getattr(everything, entries).values()}
+            expected = {entry.label.lower() for entry in getattr(catalogue, entries).values()}
+            assert {label for label in labels if label in text.lower()} == expected
+        assert re.search(rf"\b{len(catalogue.receptacles)}\b", text) and "{" not in text
+
+
+def test_the_story_of_the_apartment_takes_as_long_to_read_as_ever(house):
+    assert reading_time(with_names(story_text(), house.catalogue)) == pytest.approx(60.0 * 106 / 238.0)
 
 
 def test_a_design_names_phases(tmp_path):

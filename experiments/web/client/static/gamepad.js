@@ -1,4 +1,5 @@
-// A gamepad of the standard layout: left stick walks, right stick turns and looks, buttons as in the table.
+// A gamepad of the standard layout: left stick walks, right stick turns and looks, buttons as in the table. Browsers
+// do not report which button is which on other gamepads, so a press on them is answered with a sentence.
 
 /** @import { Inputs } from "./inputs.js" */
 
@@ -21,12 +22,18 @@ export function connectGamepad(inputs, commands, listens) {
     return Math.round(Math.sign(value) * Math.min(1, beyond) * 20) / 20; // coarse steps, so that few inputs are sent
   };
   const poll = () => {
-    const pad = navigator.getGamepads().find((found) => found?.mapping === "standard");
+    const pads = navigator.getGamepads().filter((found) => found !== null);
+    const pad = pads.find((found) => found.mapping === "standard") ?? pads[0];
     if (!pad) {
       running = false;
       return inputs.hold("gamepad", {});
     }
     const pressed = pad.buttons.map((button) => button.pressed);
+    if (pad.mapping !== "standard") {
+      if (pressed.some((down, i) => down && !before[i])) commands.unknownPad?.();
+      before = pressed;
+      return requestAnimationFrame(poll);
+    }
     if (listens()) {
       const [x = 0, y = 0, turn = 0, look = 0] = pad.axes.map(stick);
       inputs.hold("gamepad", { forward: -y, left: -x, turn: -turn, look: -look });

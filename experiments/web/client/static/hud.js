@@ -7,6 +7,7 @@ import { drawMap } from "./map.js";
 import { textOf } from "./texts.js";
 
 const CONTEXT = 2; // rows kept visible above the current one
+const TAPPED = 0.1; // farthest tap from the middle of an object that counts as a tap on it, as a share of the view's width
 const LATEST = 200; // longest wait of a moment for its frame, in ms
 const SYMBOLS = { info: "ℹ", success: "✓", refusal: "✕" };
 
@@ -20,6 +21,8 @@ export class Hud {
   #state = null;
   #key;
   reach = false; // true if the action key would do something
+  /** @type {[number, number] | null} */
+  #at = null; // where the object in reach is, in shares of the view
 
   /** @param {() => string} key name of the action key */
   constructor(key) {
@@ -92,17 +95,27 @@ export class Hud {
     if (!reach) return;
     const values = { Object: reach.object, Receptacle: reach.receptacle ?? "" };
     const what = textOf(reach.receptacle ? "put_into" : "pick_up_object", values);
-    mark.replaceChildren(made("kbd", this.#key()), made("span", what));
+    const label = [made("kbd", this.#key()), " ", made("span", what)];
+    // It is in a live region: setting the same label would make a screen reader repeat it.
+    if (mark.textContent !== `${this.#key()} ${what}`) mark.replaceChildren(...label);
     this.moveReach(reach.at);
   }
 
   /** Moves the mark of the object in reach to a position in shares of the view. @param {[number, number] | null} at */
   moveReach(at) {
+    this.#at = at;
     const mark = byId("reach", HTMLElement);
     mark.classList.toggle("away", !at);
     const [x, y] = at ?? [0.5, 0.9];
-    mark.style.left = `${100 * Math.min(Math.max(x, 0.15), 0.85)}%`;
-    mark.style.top = `${100 * Math.min(Math.max(y, 0.15), 0.95)}%`;
+    mark.style.setProperty("--x", `${Math.min(Math.max(x, 0), 1)}`);
+    mark.style.top = `clamp(4rem, ${100 * y}%, 95%)`;
+  }
+
+  /** Returns true if a point of the page is on the object in reach. @param {number} x px @param {number} y px */
+  isReached(x, y) {
+    if (!this.reach || !this.#at) return false;
+    const { left, top, width, height } = byId("view", HTMLElement).getBoundingClientRect();
+    return Math.hypot(x - left - this.#at[0] * width, y - top - this.#at[1] * height) < TAPPED * width;
   }
 
   /** @param {ChecklistItem} item */

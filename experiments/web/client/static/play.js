@@ -28,6 +28,7 @@ import { textOf } from "./texts.js";
 import { rememberVisit } from "./visit.js";
 
 const DONE = 1500; // how long the end of a trial is shown, in ms
+const NOTICE = 8000; // how long a notice is shown, in ms
 const TICK = 20; // timer period in ms, since animation frames stop in background pages
 
 const page = byId("play", HTMLElement);
@@ -81,6 +82,12 @@ const help = new Help(byId("help", HTMLDialogElement), bindings, () => {
 const commands = {
   help: () => (help.open ? help.hide() : openHelp()),
   pause: () => (shown === "paused" ? run() : pause("asked")),
+  unknownPad: () => {
+    const notice = byId("notice", HTMLElement);
+    notice.textContent = textOf("gamepad_unknown");
+    notice.showPopover?.();
+    setTimeout(() => notice.hidePopover?.(), NOTICE);
+  },
   confirm: () => /** @type {HTMLElement | null} */ (document.querySelector("dialog[open] .button"))?.click(),
 };
 const listens = () => session.phase === "running" && shown === "task" && !help.open;
@@ -275,7 +282,7 @@ full.addEventListener("click", () => {
 });
 connectKeyboard(bindings, inputs, commands, listens);
 const mouse = connectMouse(canvas, inputs, listens);
-connectTouch(canvas, byId("touch", HTMLElement), inputs, listens);
+connectTouch(canvas, byId("touch", HTMLElement), inputs, listens, (x, y) => hud.isReached(x, y));
 connectGamepad(inputs, commands, listens);
 watchPage(canvas, {
   release: () => inputs.release(),

@@ -6,6 +6,7 @@ import { ACTIONS } from "./bindings.js";
 
 const TURN_PER_PIXEL = 0.0025; // rad
 const TURN_PER_TOUCHED_PIXEL = 0.006; // rad
+const STILL = 10; // how far a finger may move during a tap, in pixels
 const LINE = 40; // wheel movement per row, in pixels
 
 /**
@@ -50,13 +51,16 @@ export function connectMouse(canvas, inputs, listens) {
  * @param {HTMLElement} buttons
  * @param {Inputs} inputs
  * @param {() => boolean} listens whether inputs are for the view
+ * @param {(x: number, y: number) => boolean} isReached whether the object in reach is at a point of the page
  */
-export function connectTouch(canvas, buttons, inputs, listens) {
+export function connectTouch(canvas, buttons, inputs, listens, isReached) {
   /** @type {PointerEvent | null} */
   let last = null;
+  /** @type {PointerEvent | null} */
+  let first = null; // start of a tap, null once the finger has moved
   canvas.addEventListener("pointerdown", (event) => {
     if (event.pointerType !== "touch") return;
-    last = event;
+    first = last = event;
     canvas.setPointerCapture(event.pointerId);
   });
   canvas.addEventListener("pointermove", (event) => {
@@ -66,6 +70,11 @@ export function connectTouch(canvas, buttons, inputs, listens) {
       (event.clientY - last.clientY) * TURN_PER_TOUCHED_PIXEL,
     );
     last = event;
+    if (first && Math.hypot(event.clientX - first.clientX, event.clientY - first.clientY) > STILL) first = null;
+  });
+  canvas.addEventListener("pointerup", (event) => {
+    if (first?.pointerId === event.pointerId && listens() && isReached(event.clientX, event.clientY)) inputs.press("act");
+    first = null;
   });
   for (const button of buttons.querySelectorAll("button")) {
     const { hold: name, press, scroll } = button.dataset;

@@ -15,7 +15,7 @@ let listening = true;
 let inputs;
 /** @type {HTMLCanvasElement} */
 let canvas;
-const [pause, confirm] = [vi.fn(), vi.fn()];
+const [pause, confirm, unknownPad] = [vi.fn(), vi.fn(), vi.fn()];
 const listens = () => listening;
 
 /** Sends an event with values that its constructor does not take. @param {EventTarget} target @param {Event} event @param {object} [values] */
@@ -122,7 +122,8 @@ describe("the mouse", () => {
 });
 
 describe("a touch screen", () => {
-  beforeEach(() => connectTouch(canvas, /** @type {HTMLElement} */ (document.getElementById("touch")), inputs, listens));
+  const reached = vi.fn(() => true);
+  beforeEach(() => connectTouch(canvas, /** @type {HTMLElement} */ (document.getElementById("touch")), inputs, listens, reached));
   const touch = (/** @type {Element | null} */ target, /** @type {string} */ type, x = 0, y = 0, pointerId = 1) =>
     target && send(target, new PointerEvent(type, { pointerType: "touch", pointerId, clientX: x, clientY: y, cancelable: true }));
   const button = (/** @type {string} */ selector) => document.querySelector(`#touch ${selector}`);
@@ -134,6 +135,23 @@ describe("a touch screen", () => {
     touch(canvas, "pointermove", 0, 0, 2); // of another finger
     vi.runAllTimers();
     expect(sent).toEqual([{ yaw: 0.3 }]);
+  });
+
+  test("acts on the object in reach by a tap on it, and on nothing by a drag or a tap elsewhere", () => {
+    const tap = (/** @type {number} */ to) => {
+      touch(canvas, "pointerdown", 100, 100);
+      touch(canvas, "pointermove", to, 100);
+      touch(canvas, "pointerup", to, 100);
+      vi.runAllTimers();
+      return sent.splice(0).filter((input) => "press" in input).length;
+    };
+    expect(tap(103)).toBe(1);
+    expect(reached).toHaveBeenLastCalledWith(103, 100);
+    expect(tap(140)).toBe(0);
+    reached.mockReturnValueOnce(false);
+    expect(tap(103)).toBe(0);
+    listening = false;
+    expect(tap(103)).toBe(0);
   });
 
   test("walks and turns while its buttons are held", () => {
@@ -163,7 +181,7 @@ describe("a gamepad", () => {
   beforeEach(() => {
     pad = { mapping: "standard", axes: [0, 0, 0, 0], buttons: Array.from({ length: 17 }, () => ({ pressed: false })) };
     Object.assign(navigator, { getGamepads: () => [null, pad] });
-    connectGamepad(inputs, { pause, confirm }, listens);
+    connectGamepad(inputs, { pause, confirm, unknownPad }, listens);
     window.dispatchEvent(new Event("gamepadconnected"));
   });
   const press = (/** @type {number} */ index) => {
@@ -187,6 +205,14 @@ describe("a gamepad", () => {
     vi.runAllTicks();
     expect(sent).toEqual([{ press: "act" }, { press: "left hand" }, { scroll: 1 }]);
     expect(pause).toHaveBeenCalledOnce();
+  });
+
+  test("of an unknown layout says so when it is used", () => {
+    if (pad) [pad.mapping, pad.axes] = ["", [0, -1, 0, 0]];
+    vi.advanceTimersByTime(50);
+    expect(unknownPad).not.toHaveBeenCalled();
+    for (const index of [0, 9]) press(index);
+    expect([unknownPad.mock.calls.length, pause.mock.calls.length, sent]).toEqual([2, 0, []]);
   });
 
   test("confirms a dialog, and nothing else while that is open", () => {

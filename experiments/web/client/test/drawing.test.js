@@ -240,9 +240,9 @@ describe("markers", () => {
     expect(shown()).toEqual([]);
   });
 
-  test("x-ray ones have a second, faint pass; outlined ones a dark sphere", () => {
+  test("x-ray ones have a second, faint pass with two lines around it; outlined ones a dark sphere", () => {
     markers.show([marker({ x_ray: true }), marker({ outlined: true }), marker({ shape: "cylinder", rgba: [1, 1, 1, 0.5] })]);
-    expect(shown().length).toBe(5);
+    expect(shown().length).toBe(7);
   });
 
   test("take their sizes as MuJoCo's geoms do", () => {

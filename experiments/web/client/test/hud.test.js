@@ -31,7 +31,7 @@ describe("the display", () => {
     vi.useFakeTimers();
     document.body.innerHTML =
       '<p id="progress"></p><p id="clock"></p><p id="room"></p><h2 id="list-title"></h2><ul id="list"></ul><div id="pointer" hidden></div>' +
-      '<button id="reach" hidden></button><p id="message"></p><ul id="hands"></ul><ul id="bins"></ul><canvas id="map"></canvas>';
+      '<button id="reach" hidden></button><p id="message"></p><ul id="hands"></ul><ul id="bins"></ul><canvas id="map"></canvas><div id="view"></div>';
     giveTexts();
     hud = new Hud(() => "E");
   });
@@ -65,13 +65,33 @@ describe("the display", () => {
     hud.expect(moment({ reach: { object: "Mug", receptacle: null, at: [0.5, 0.25], instance: "object_00", place: [1, 2, 0] } }));
     expect(hud.reach).toBe(false); // its frame is not on show yet
     hud.reached(1);
-    expect([hud.reach, part("reach").textContent, part("reach").style.top]).toEqual([true, "EPick up Mug", "25%"]);
+    expect([hud.reach, part("reach").textContent, part("reach").style.top]).toEqual([true, "E Pick up Mug", "clamp(4rem, 25%, 95%)"]);
     hud.expect(moment({ step: 2, reach: { object: "Mug", receptacle: "Dish bin", at: null, instance: "object_00", place: [3, 4, 1] } }));
     hud.reached(2);
-    expect([part("reach").textContent, part("reach").classList.contains("away")]).toEqual(["EPut Mug into Dish bin", true]);
+    expect([part("reach").textContent, part("reach").classList.contains("away")]).toEqual(["E Put Mug into Dish bin", true]);
     hud.expect(moment({ step: 3 }));
     vi.runAllTimers(); // no frame comes where nothing has moved
     expect([part("reach").hidden, part("room").textContent, part("clock").textContent]).toEqual([true, "Hall", "1:23"]);
+  });
+
+  test("is tapped where it is, and only while it is in reach", () => {
+    part("view").getBoundingClientRect = () => new DOMRect(100, 50, 800, 600);
+    const reach = { object: "Mug", receptacle: null, instance: "object_00", place: /** @type {[number, number, number]} */ ([1, 2, 0]) };
+    hud.showMoment(moment({ reach: { ...reach, at: [0.5, 0.25] } }));
+    expect([hud.isReached(500, 200), hud.isReached(540, 240), hud.isReached(500, 400)]).toEqual([true, true, false]);
+    hud.showMoment(moment({ reach: { ...reach, at: null } }));
+    expect(hud.isReached(500, 200)).toBe(false);
+    hud.showMoment(moment({}));
+    expect(hud.isReached(500, 200)).toBe(false);
+  });
+
+  test("its label never leaves the view, and is not read out twice", () => {
+    const reach = { object: "Mug", receptacle: null, instance: "object_00", place: /** @type {[number, number, number]} */ ([1, 2, 0]) };
+    hud.showMoment(moment({ reach: { ...reach, at: [0.98, 0.5] } }));
+    expect(part("reach").style.getPropertyValue("--x")).toBe("0.98");
+    const [key] = part("reach").children;
+    hud.showMoment(moment({ reach: { ...reach, at: [0.5, 0.5] } }));
+    expect(part("reach").children[0]).toBe(key); // a live region reads new nodes
   });
 
   test("shows pictures that come later, and keeps the current row of a long list in sight", () => {

@@ -431,7 +431,7 @@ describe("a browser that draws", () => {
     expect([part("busy").textContent, part("busy").className]).toEqual(["One moment", "asked"]);
     vi.advanceTimersByTime(100);
     const press = socket().inputs.find((input) => input.press === "act");
-    expect(part("reach").style.left).toBe("25%"); // where the object is drawn
+    expect(part("reach").style.getPropertyValue("--x")).toBe("0.25"); // where the object is drawn
     socket().receive({ ...STATE, step: 1 }); // of before the press
     expect(part("busy").textContent).toBe("One moment");
     socket().receive({ ...STATE, step: 2, busy: true });

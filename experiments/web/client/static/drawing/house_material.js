@@ -16,6 +16,7 @@ import { upright } from "./camera.js";
  * @property {boolean} [blend] whether one can see through it
  * @property {boolean} [tinted] whether instances have a `tint`, and all the same `shine`, instead of `color` and `_shine` of vertices
  * @property {boolean} [flat] whether it has its exact colour without any light
+ * @property {number} [grown] how much instances are grown in every direction, as a share of the picture's height
  * @property {boolean} [behind] whether instances are shifted behind themselves, seen from the eye
  * @property {number[]} [shine] specular, shininess and emission
  */
@@ -45,12 +46,12 @@ export function houseMaterial(light, { map = null, blend = false, shine = [0, 0,
     map.colorSpace = NoColorSpace;
     map.updateMatrix();
   }
-  const flags = { TEXTURED: map, BLEND: blend, TINTED: look.tinted, FLAT: look.flat, BEHIND: look.behind };
+  const flags = { TEXTURED: map, BLEND: blend, TINTED: look.tinted, FLAT: look.flat, GROWN: look.grown, BEHIND: look.behind };
   const set = Object.entries(flags).filter(([, value]) => value);
   return new ShaderMaterial({
     transparent: blend,
     depthWrite: !blend,
-    defines: { LIGHTS: light["lights"]?.value.length, ...Object.fromEntries(set.map(([flag]) => [flag, 1])) },
+    defines: { LIGHTS: light["lights"]?.value.length, ...Object.fromEntries(set.map(([flag, value]) => [flag, Number(value) || 1])) },
     uniforms: { ...light, map: { value: map }, mapping: { value: map?.matrix ?? new Matrix3() }, shine: { value: new Vector3(...shine) } },
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
@@ -111,6 +112,10 @@ void main() {
   vMap = (mapping * vec3(uv, 1.0)).xy;
   #endif
   vec4 place = placed * vec4(position, 1.0);
+  #ifdef GROWN
+  float away = max(-(viewMatrix * placed[3]).z, 0.0);
+  place.xyz += mat3(modelMatrix) * position * 2.0 * GROWN * away / projectionMatrix[1][1];
+  #endif
   #ifdef BEHIND
   vec3 centre = placed[3].xyz;
   float radius = length(placed[0].xyz);

@@ -8,7 +8,7 @@ import { Instances } from "./instances.js";
 
 /** @import { Marker } from "../protocol.js" */
 /** @import { Uniforms } from "./house_material.js" */
-/** @typedef {"solid" | "clear" | "x-ray" | "hidden" | "outline"} Kind */
+/** @typedef {"solid" | "clear" | "x-ray" | "hidden" | "outline" | "inner line" | "outer line"} Kind */
 
 // The numbers of mjsim/render/markers.py.
 const CAPACITY = 1024;
@@ -17,6 +17,11 @@ const LIT = 0.32;
 const HIDDEN_OPACITY = 0.3;
 const OUTLINE = 1.4; // radius of the dark sphere behind a sphere, in radii of that
 const OUTLINE_RGBA = [0.03, 0.06, 0.2, 1];
+// Lines around an x-ray marker that something hides, from the inside to the outside: colour, and share of the picture's
+// height. Every colour has a contrast of at least 3 : 1 to one of the two tones.
+/** @type {[Kind, number[]][]} */
+export const LINES = [["inner line", [8 / 255, 15 / 255, 51 / 255, 1]], ["outer line", [242 / 255, 242 / 255, 242 / 255, 1]]];
+const LINE_WIDTH = 0.0025;
 const FIRST = 10; // in the order of drawing: after the house and what it contains
 const SEEN = 1; // bit of the stencil where an x-ray marker is seen already
 
@@ -39,12 +44,14 @@ export class Markers extends Group {
       "x-ray": houseMaterial(light, lit),
       hidden: houseMaterial(light, { tinted: true, flat: true }),
       outline: houseMaterial(light, { ...lit, behind: true }),
+      "inner line": houseMaterial(light, { tinted: true, flat: true, grown: LINE_WIDTH }),
+      "outer line": houseMaterial(light, { tinted: true, flat: true, grown: 2 * LINE_WIDTH }),
     };
     const seen = { stencilWrite: true, stencilRef: SEEN, stencilFuncMask: SEEN, stencilWriteMask: SEEN, stencilZPass: ReplaceStencilOp };
     materials["x-ray"].setValues(seen);
     // Each hidden place is blended once, and none where the marker itself is seen.
     const behind = { transparent: true, depthWrite: false, depthFunc: GreaterDepth, stencilFunc: NotEqualStencilFunc };
-    materials.hidden.setValues({ ...seen, ...behind });
+    for (const kind of /** @type {const} */ (["hidden", "inner line", "outer line"])) materials[kind].setValues({ ...seen, ...behind });
     const shapes = {
       sphere: new SphereGeometry(1, 16, 8).rotateX(Math.PI / 2),
       cylinder: new CylinderGeometry(1, 1, 2, 16).rotateX(Math.PI / 2),
@@ -65,7 +72,10 @@ export class Markers extends Group {
     for (const set of this.#sets.values()) set.empty();
     for (const marker of markers) {
       this.#put(marker, marker.rgba[3] < 0.995 ? "clear" : marker.x_ray ? "x-ray" : "solid", marker.rgba, LIT);
-      if (marker.x_ray) this.#put(marker, "hidden", marker.rgba, 1, HIDDEN_OPACITY);
+      if (marker.x_ray) {
+        this.#put(marker, "hidden", marker.rgba, 1, HIDDEN_OPACITY);
+        for (const [kind, rgba] of LINES) this.#put(marker, kind, rgba, 1);
+      }
       if (marker.outlined && marker.shape === "sphere") this.#put(marker, "outline", OUTLINE_RGBA, LIT, 1, OUTLINE);
     }
     for (const set of this.#sets.values()) set.send();
