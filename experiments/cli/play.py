@@ -3,7 +3,6 @@
 import argparse
 import asyncio
 import socket
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -34,7 +33,7 @@ from experiments.record.phases import FLYTHROUGH, HUMAN, PHASES, STORY, TASK, ph
 from experiments.trials.trial_config import TrialConfig
 from experiments.visit.texts.items import Item
 from hud.conditions import condition
-from mjsim.support.files import read_text
+from mjsim.support.toml import read_toml
 from planner.solvers import SOLVERS, solver
 
 if TYPE_CHECKING:
@@ -105,8 +104,10 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     task = task_of(arguments)
-    if arguments.film is not None and not arguments.film.is_file():
-        raise ConfigError(f"film {arguments.film} does not exist; leave out --film, or name an MP4 file")
+    if arguments.film is not None:
+        from experiments.session.video import check_film
+
+        check_film(arguments.film)
     check_public_url(arguments.public_url)
     questions = questions_of(arguments)
     with listen(arguments.host, arguments.port) as listener, locked(arguments.out):
@@ -195,7 +196,7 @@ def questions_of(arguments: argparse.Namespace) -> tuple[Item, ...]:
     if path is None:
         return ()
     try:
-        asked = tomllib.loads(read_text(path)).get("question") or []
+        asked = read_toml(path).get("question") or []
         items = [
             {"name": f"question_{number}", "kind": "choice", "text": one["text"]}
             | {"choices": one["choices"], "right": one["answer"]}

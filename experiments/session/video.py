@@ -11,7 +11,7 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.errors import RecordError
+from experiments.errors import ConfigError, RecordError
 
 Image = NDArray[np.uint8]
 QUEUE_LENGTH = 8  # maximum number of frames that wait to be encoded
@@ -90,3 +90,16 @@ class VideoWriter:
                 self._hash.update(np.ascontiguousarray(frame).data)
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
             container.mux(stream.encode())
+
+
+def check_film(path: Path) -> None:
+    """Raise ConfigError if a file is missing or is not an MP4 video."""
+    if not path.is_file():
+        raise ConfigError(f"film {path} does not exist; leave out --film, or name an MP4 file")
+    try:
+        with path.open("rb") as file, av.open(file) as film:
+            found = "mp4" in film.format.name and len(film.streams.video) > 0
+    except (OSError, ValueError):  # includes the errors of FFmpeg
+        found = False
+    if not found:
+        raise ConfigError(f"film {path} is not an MP4 video; leave out --film, or name an MP4 file")
