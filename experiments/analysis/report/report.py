@@ -265,11 +265,10 @@ def _mixed(analysis: Analysis) -> Iterator[Block]:
 
 def _houses(analysis: Analysis) -> Iterator[Block]:
     found, labels = analysis.table, _labels(analysis)
-    if len(set(found.houses.tolist())) < 2:
-        return
     rooms, area, density = found.numbers(ROOMS), found.numbers("area_m2"), found.densities()
     rows = []
-    for count in sorted(set(rooms[~np.isnan(rooms)].tolist())):
+    is_one = len({row.get("house") for row in found.rows}) < 2  # perhaps in several layouts
+    for count in sorted(set() if is_one else set(rooms[~np.isnan(rooms)].tolist())):
         homes = found.take(np.flatnonzero(rooms == count))
         means = (homes.groups(name).get(c) for name in labels for c in found.conditions())
         about = len(set(homes.houses.tolist())), len(homes.rows)
