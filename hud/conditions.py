@@ -19,15 +19,10 @@ CONDITIONS = ("guided", "highlight", "none", "optimal")
 OPTIONS = ("bins", "minimap", "pin", "pointer", "regret", "reroute", "rims", "xray")
 
 
-# Built-in conditions that show nothing of the plan, unless one of the following options is added.
-WITHOUT_PLAN = ("highlight", "none")
-PLAN_OPTIONS = ("pin", "pointer", "regret")
-
-
 def hides_plan(name: str) -> bool:
     """Return True if a condition is known to show nothing of the plan."""
     base, *options = name.split("-")
-    return base in WITHOUT_PLAN and not set(options) & set(PLAN_OPTIONS)
+    return base in ("highlight", "none") and not {"pin", "pointer", "regret"} & set(options)
 
 
 def condition(name: str) -> Condition:

@@ -153,7 +153,7 @@ def _generate(arguments: argparse.Namespace) -> int:
     from mjsim.house.catalogue.model_files import copy_house
 
     out: Path = arguments.out
-    if out.exists() and not (arguments.force and (out / "recipe.json").is_file()):
+    if os.path.lexists(out) and not (arguments.force and (out / "recipe.json").is_file()):
         raise ConfigError(f"{out} exists; name a new folder, or replace a generated house with --force")
     rooms = "" if arguments.rooms is None else f"?rooms={arguments.rooms}"
     house = House.load(f"generated:{arguments.seed}{rooms}")

@@ -156,6 +156,10 @@ def _run(words: list[str]) -> int:
     commands = parser(*known)
     if bad := next((word for word in words if word.startswith("--") and word.endswith("=--")), None):
         commands.error(f"{bad} has no value")  # argparse would turn the missing value into an empty list
+    if "" in words or any(word.startswith("--") and word.endswith("=") for word in words):
+        commands.error(
+            "an argument is empty; give a value, or leave it out"
+        )  # an empty path is the current folder
     try:
         arguments = commands.parse_args(words)
     except SystemExit:

@@ -33,6 +33,8 @@ from experiments.record.phases import FLYTHROUGH, HUMAN, PHASES, STORY, TASK, ph
 from experiments.trials.trial_config import TrialConfig
 from experiments.visit.texts.items import Item
 from hud.conditions import condition
+from mjsim.house.catalogue.files import catalogue_file
+from mjsim.house.catalogue.house_ref import parse_house
 from mjsim.support.toml import read_toml
 from planner.solvers import SOLVERS, solver
 
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
 
 OBJECTS = 6
 
+MAX_MINIMUM_S = 86400  # longest minimum duration of a phase, in seconds
 DESCRIPTION = """\
 Start a server on which people tidy the apartment in a browser, with keyboard and mouse, gamepad or touch. Print its URL
 on a separate line and open it. A visit consists of a story, a film of the house (with --film), a training with one
@@ -132,6 +135,8 @@ def task_of(arguments: argparse.Namespace) -> TrialConfig:
     )
     condition(task.assistance)
     condition(task.training_assistance)
+    if (house := parse_house(task.house)).file is not None:  # houses are only loaded in the worker processes
+        catalogue_file(house)
     if task.planner not in SOLVERS:  # built-in planners are only loaded in the worker processes
         solver(task.planner)
     return task
@@ -177,7 +182,10 @@ def _minimum(text: str) -> dict[str, float]:
     parts = dict(part.strip().partition("=")[::2] for part in text.split(","))
     if unknown := [name for name in parts if name not in PHASES or name == TASK]:
         raise argparse.ArgumentTypeError(f"no phase {unknown[0]!r} before the task in {text!r}")
-    return {name: seconds(value) for name, value in parts.items()}
+    found = {name: seconds(value) for name, value in parts.items()}
+    if (longest := max(found.values())) > MAX_MINIMUM_S:
+        raise argparse.ArgumentTypeError(f"{longest:g} s is too long; give at most {MAX_MINIMUM_S} s")
+    return found
 
 
 def shown_phases(arguments: argparse.Namespace) -> tuple[str, ...]:

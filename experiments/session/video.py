@@ -3,6 +3,7 @@
 import hashlib
 import queue
 import threading
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Self
@@ -94,12 +95,9 @@ class VideoWriter:
 
 def check_film(path: Path) -> None:
     """Raise ConfigError if a file is missing or is not an MP4 video."""
-    if not path.is_file():
-        raise ConfigError(f"film {path} does not exist; leave out --film, or name an MP4 file")
-    try:
+    fault = "is not an MP4 video" if path.is_file() else "does not exist"
+    with suppress(OSError, ValueError):  # these include the errors of FFmpeg
         with path.open("rb") as file, av.open(file) as film:
-            found = "mp4" in film.format.name and len(film.streams.video) > 0
-    except (OSError, ValueError):  # includes the errors of FFmpeg
-        found = False
-    if not found:
-        raise ConfigError(f"film {path} is not an MP4 video; leave out --film, or name an MP4 file")
+            fault = "" if "mp4" in film.format.name and film.streams.video else fault
+    if fault:
+        raise ConfigError(f"film {path} {fault}; leave out --film, or name an MP4 file")

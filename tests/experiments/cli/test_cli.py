@@ -87,7 +87,7 @@ def test_the_overview_names_every_command():
         ([*PLAY, "--film", "nothing.mp4"], "film nothing.mp4 does not exist"),
         ([*PLAY, "--film", DESIGN], "is not an MP4 video"),
         ([*PLAY, "--public-url", "http://a:99999"], "must be of the form"),
-        ([*PLAY, "--public-url", ""], "must be of the form"),
+        ([*PLAY, "--house", "castle"], "no house 'castle'"),
         ([*PLAY, "--public-url", "ftp://x"], "must be of the form"),
         ([*PLAY, "--public-url", "http://[::1"], "must be of the form"),
         ([*PLAY, "--minimum", "flythrough=60"], "refers to the phase flythrough, which is not shown"),
@@ -294,7 +294,18 @@ numpy.ones(1) / numpy.zeros(1)"""
     assert "nowhere.json" in done.stderr and "Warning" not in done.stderr
 
 
-def test_an_empty_host_does_not_mean_all_addresses(capsys):
-    with pytest.raises(SystemExit):
-        main([*PLAY, "--host", ""])
-    assert "is empty; name an address" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        ([*PLAY, "--host", " "], "is empty; name an address"),
+        (["study", "serve", "s.toml", "--out", "x", "--researcher-host", " "], "is empty; name an address"),
+        ([*PLAY, "--host", ""], "an argument is empty"),
+        (["metrics", ""], "an argument is empty"),
+        (["replay", "run", "--assistance="], "an argument is empty"),
+        ([*PLAY, "--minimum", "story=1e99"], "1e+99 s is too long; give at most 86400 s"),
+    ],
+)
+def test_values_that_mean_nothing_are_refused(words, fault, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(words)
+    assert stop.value.code == 2 and fault in capsys.readouterr().err
