@@ -96,8 +96,7 @@ class VideoWriter:
 def check_film(path: Path) -> None:
     """Raise ConfigError if a file is missing or is not an MP4 video."""
     fault = "is not an MP4 video" if path.is_file() else "does not exist"
-    with suppress(OSError, ValueError):  # these include the errors of FFmpeg
-        with path.open("rb") as file, av.open(file) as film:
-            fault = "" if "mp4" in film.format.name and film.streams.video else fault
+    with suppress(OSError, ValueError), path.open("rb") as file, av.open(file) as film:  # or errors of FFmpeg
+        fault = "" if "mp4" in film.format.name and film.streams.video else fault
     if fault:
         raise ConfigError(f"film {path} {fault}; leave out --film, or name an MP4 file")
