@@ -21,6 +21,7 @@ from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap
 from mjsim.house.scene.disorder import Disorder
 from mjsim.house.scene.sampling import house_points, sample_episode
 from mjsim.house.validation.validate import require_usable
+from mjsim.support.toml import read_toml
 from mjsim.values.episode import POINTS, Episode
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.walking.path_following import ARRIVED_WITHIN
@@ -185,7 +186,7 @@ def read_words(language: str = "en") -> Mapping[str, Mapping[str, Any]]:
     if not path.is_file():
         known = ", ".join(sorted(file.stem for file in TEXTS.glob("*.toml")))
         raise ConfigError(f"no texts in language {language!r}; there are {known}")
-    return msgspec.toml.decode(path.read_bytes(), type=dict[str, dict[str, Any]])
+    return msgspec.convert(read_toml(path), dict[str, dict[str, Any]])
 
 
 def _navmesh(floor: Footprint, radius: float) -> NavMesh:

@@ -19,6 +19,12 @@ CONDITIONS = ("guided", "highlight", "none", "optimal")
 OPTIONS = ("bins", "minimap", "pin", "pointer", "regret", "reroute", "rims", "xray")
 
 
+def hides_plan(name: str) -> bool:
+    """Return True if a condition is known to show nothing of the plan."""
+    base, *options = name.split("-")
+    return base in ("highlight", "none") and not {"pin", "pointer", "regret"} & set(options)
+
+
 def condition(name: str) -> Condition:
     """Return a condition by its name, such as `optimal`, `optimal-minimap` or `package.module:attribute`.
 

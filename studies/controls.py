@@ -1,6 +1,5 @@
 """Negative controls: studies that lack a part of the model and should not reproduce published results."""
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from experiments.errors import ConfigError
 from experiments.participants.distribution import Distributions
 from experiments.trials.design import Design
 from experiments.trials.trial_config import TrialConfig
-from mjsim.support.files import read_text
+from mjsim.support.toml import read_toml
 
 FILE = Path(__file__).with_name("controls.toml")
 
@@ -52,14 +51,8 @@ def read_controls(design: Design, path: Path = FILE, *, only: str | None = None)
         ConfigError: The file cannot be used, there is no such control, or a control has no participants.
     """
     try:
-        tables = msgspec.convert(tomllib.loads(read_text(path)), dict[str, _Control])
-    except (
-        OSError,
-        UnicodeDecodeError,
-        RecursionError,
-        tomllib.TOMLDecodeError,
-        msgspec.ValidationError,
-    ) as error:
+        tables = msgspec.convert(read_toml(path), dict[str, _Control])
+    except (OSError, ValueError) as error:
         raise ConfigError(f"cannot use {path}: {error}") from error
     if only is not None and only not in tables:
         raise ConfigError(f"no control {only!r}; there are {', '.join(tables)}")

@@ -8,6 +8,7 @@ import msgspec
 from scipy.stats import f
 
 from experiments.analysis.statistics.effects import ALPHA, FTest, Interval, partial_eta_squared
+from mjsim.support.toml import read_toml
 
 FILE = Path(__file__).with_name("published.toml")
 NOT_SIGNIFICANT = "n.s."
@@ -148,7 +149,7 @@ class Published(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 def read_published(path: Path = FILE) -> Published:
     """Load the published results from a TOML file."""
-    return msgspec.toml.decode(path.read_bytes(), type=Published)
+    return msgspec.convert(read_toml(path), Published)
 
 
 def inconsistencies(published: Published) -> Sequence[str]:

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from experiments.analysis.page import p_value
+from experiments.analysis.page import p_text
 from experiments.analysis.statistics.effects import ALPHA, FTest, Interval
 from experiments.analysis.study.measures import LIKERT_PREFIX
 from experiments.analysis.study.table import StudyTable
@@ -27,6 +27,7 @@ from studies.truth import true_studies
 
 POOL = 200  # smallest number of participants per cell in a pool
 TRUTHS = 100  # number of random studies from a population that has the published effects
+SCORED = 20  # number of these studies whose log scores are computed, which takes long
 EFFECT_SIZE, INFERENCE, DIRECTION, VARIANCE = "effect size", "inference", "direction", "variance order"
 NOT_SIMULATED = "not simulated"
 
@@ -85,6 +86,7 @@ class Score:
         rows: The rows in the order of the published results.
         left_out: Participants in the table who are not judged.
         truths: Numbers of agreeing rows in studies with the published effects, by line of the summary.
+        log_truths: Log scores of studies with the published effects, over the rows that have a log score.
     """
 
     origin: str
@@ -94,6 +96,7 @@ class Score:
     rows: tuple[Row, ...]
     left_out: tuple[LeftOut, ...]
     truths: tuple[tuple[int, ...], ...] = ()
+    log_truths: tuple[float, ...] = ()
 
     def summary(self) -> Iterator[tuple[str, str, int, int, int, str]]:
         """Yield name, fitted or not, numbers of agreeing, judged and all rows, and a reference range."""
@@ -153,8 +156,8 @@ def score(table: StudyTable, published: Published, *, seed: int = 0) -> Score:
     is_pool = all(known[cell] >= POOL for cell in sizes)
     judge = _Judge(inside, published, tuple(draw(inside, published, seed)) if is_pool else ())
     true = [
-        tuple(_Judge(study, published, (), scores=False).rows())
-        for study in true_studies(inside, published, seed, TRUTHS)
+        tuple(_Judge(study, published, (), scores=number < SCORED).rows())
+        for number, study in enumerate(true_studies(inside, published, seed, TRUTHS))
     ]
     rows = tuple(
         replace(row, truth=None if ours[0].agrees is None else sum(o.agrees is True for o in ours) / TRUTHS)
@@ -162,7 +165,9 @@ def score(table: StudyTable, published: Published, *, seed: int = 0) -> Score:
     )
     counts = [[sum(r.agrees is True for r in line) for *_, line in _lines(study)] for study in true]
     usual, truths = known == Counter(sizes), tuple(zip(*counts, strict=True))
-    return Score(table.origin, len(inside.rows), is_pool, usual, rows, table.left_out, truths)
+    scored = [number for number, row in enumerate(rows) if row.log_score is not None]
+    likely = tuple(sum(study[number].log_score or 0.0 for number in scored) for study in true[:SCORED])
+    return Score(table.origin, len(inside.rows), is_pool, usual, rows, table.left_out, truths, likely)
 
 
 @dataclass(frozen=True)
@@ -241,7 +246,7 @@ class _Judge:
         drawn = [one.p < ALPHA for one in self._drawn(test)]
         rate = self._rate([one == test.significant for one in drawn])
         if rate is None:
-            ours = f"F({found.df1},{found.df2:g}) = {found.statistic:.2f}, p {p_value(found.p)}"
+            ours = f"F({found.df1},{found.df2:g}) = {found.statistic:.2f}, {p_text(found.p)}"
             return replace(row, ours=ours, agrees=(found.p < ALPHA) == test.significant)
         ours = f"p < .05 in {sum(drawn) / len(self.replicates):.0%}"
         return replace(row, ours=ours, agrees=rate > 0.5, rate=rate)

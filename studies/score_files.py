@@ -2,10 +2,13 @@
 
 import csv
 import io
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from experiments.analysis.page import Block, Paragraph, p_value, page, table
 from experiments.analysis.study.robustness import left_out_table
@@ -81,13 +84,15 @@ def how(score: Score) -> str:
         if not score.as_published:
             judged += " Its cells are not of the published sizes, on which decisions of tests depend."
     likely = score.log_score()
+    low, high = np.quantile(score.log_truths, [0.05, 0.95]) if score.log_truths else (math.nan, math.nan)
     return (
         f"{judged} `The truth`: {TRUTHS} studies of the published size, of people whose F tests are as published on "
         "average, judged likewise."
         + (
             ""
             if likely is None
-            else f" Log score of the published F under ours: {likely:.1f} (larger is better)."
+            else f" Log score of the published F under ours: {likely:.1f} (larger is better; `the truth`: "
+            f"{low:.1f} to {high:.1f})."
         )
     )
 

@@ -74,5 +74,11 @@ def p_value(p: float | None) -> str:
     return "-" if p is None else "< .001" if p < 0.001 else f"{p:.3f}".lstrip("0")
 
 
+def p_text(p: float) -> str:
+    """Format a p-value as `p = .466` or `p < .001`."""
+    text = p_value(p)
+    return f"p {text}" if text.startswith("<") else f"p = {text}"
+
+
 def freedom(test: FTest | WaldTest) -> str:
     return f"{test.df1}, {test.df2:.4g}"

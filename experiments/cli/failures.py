@@ -3,6 +3,7 @@
 import os
 import platform
 import re
+import shutil
 import sys
 import tempfile
 import time
@@ -10,6 +11,8 @@ import traceback
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
+
+from mjsim.support.urls import redacted
 
 FAILED = 1
 USAGE_ERROR = 2
@@ -62,7 +65,9 @@ def exit_code(error: Exception) -> int | None:
 
 
 def message(error: Exception) -> str:
-    if isinstance(error, OSError) and error.strerror:
+    if isinstance(error, shutil.Error) and error.args and isinstance(error.args[0], list):
+        text = str(error.args[0][0][-1])  # the reason of the first file that could not be copied
+    elif isinstance(error, OSError) and error.strerror:
         text = f"{error.filename}: {error.strerror}" if error.filename is not None else error.strerror
     elif isinstance(error, MemoryError):
         text = f"not enough memory ({error})" if str(error) else "not enough memory"
@@ -74,7 +79,7 @@ def message(error: Exception) -> str:
         text = str(error)
     from mjsim.values.errors import brief
 
-    return brief(text)
+    return brief(redacted(text))
 
 
 def drop_output() -> None:
@@ -108,9 +113,9 @@ def _report(error: Exception, words: Sequence[str]) -> str:
 
 
 def _report_text(error: Exception, words: Sequence[str]) -> str:
-    command = _SECRET.sub(r"\1\2***", "\x00".join(words)).replace("\x00", " ")
+    command = _SECRET.sub(r"\1\2***", "\x00".join(map(redacted, words))).replace("\x00", " ")
     versions = "\n".join(f"{name} {_version(name)}" for name in DISTRIBUTIONS)
-    trace = "".join(traceback.format_exception(error))
+    trace = redacted("".join(traceback.format_exception(error)))
     text = (
         f"mjsim {command}\npython {platform.python_version()} on {platform.platform()}\n{versions}\n\n{trace}"
     )

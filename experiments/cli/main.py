@@ -14,6 +14,7 @@ from experiments.cli.doctor import add_checkout_command
 from experiments.cli.failures import USAGE_ERROR, drop_output, end_with, flush_output
 from experiments.session.signals import exit_code, exit_raised, signal_of, signals_raised
 from mjsim.support.environment import postpone_gl
+from mjsim.support.urls import redacted
 from mjsim.values.errors import brief
 
 COMMANDS = {
@@ -108,7 +109,7 @@ class Parser(argparse.ArgumentParser):
     """An argument parser that prints errors on a single line."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(USAGE_ERROR, f"mjsim: {brief(message)}; `{self.prog} --help` lists the options\n")
+        self.exit(USAGE_ERROR, f"mjsim: {brief(redacted(message))}; `{self.prog} --help` lists the options\n")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -155,6 +156,10 @@ def _run(words: list[str]) -> int:
     commands = parser(*known)
     if bad := next((word for word in words if word.startswith("--") and word.endswith("=--")), None):
         commands.error(f"{bad} has no value")  # argparse would turn the missing value into an empty list
+    if "" in words or any(word.startswith("--") and word.endswith("=") for word in words):
+        commands.error(
+            "an argument is empty; give a value, or leave it out"
+        )  # an empty path is the current folder
     try:
         arguments = commands.parse_args(words)
     except SystemExit:

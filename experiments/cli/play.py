@@ -3,7 +3,6 @@
 import argparse
 import asyncio
 import socket
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -34,7 +33,9 @@ from experiments.record.phases import FLYTHROUGH, HUMAN, PHASES, STORY, TASK, ph
 from experiments.trials.trial_config import TrialConfig
 from experiments.visit.texts.items import Item
 from hud.conditions import condition
-from mjsim.support.files import read_text
+from mjsim.house.catalogue.files import catalogue_file
+from mjsim.house.catalogue.house_ref import parse_house
+from mjsim.support.toml import read_toml
 from planner.solvers import SOLVERS, solver
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 
 OBJECTS = 6
 
+MAX_MINIMUM_S = 86400  # longest minimum duration of a phase, in seconds
 DESCRIPTION = """\
 Start a server on which people tidy the apartment in a browser, with keyboard and mouse, gamepad or touch. Print its URL
 on a separate line and open it. A visit consists of a story, a film of the house (with --film), a training with one
@@ -105,8 +107,10 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     task = task_of(arguments)
-    if arguments.film is not None and not arguments.film.is_file():
-        raise ConfigError(f"film {arguments.film} does not exist; leave out --film, or name an MP4 file")
+    if arguments.film is not None:
+        from experiments.session.video import check_film
+
+        check_film(arguments.film)
     check_public_url(arguments.public_url)
     questions = questions_of(arguments)
     with listen(arguments.host, arguments.port) as listener, locked(arguments.out):
@@ -131,6 +135,8 @@ def task_of(arguments: argparse.Namespace) -> TrialConfig:
     )
     condition(task.assistance)
     condition(task.training_assistance)
+    if (house := parse_house(task.house)).file is not None:  # houses are only loaded in the worker processes
+        catalogue_file(house)
     if task.planner not in SOLVERS:  # built-in planners are only loaded in the worker processes
         solver(task.planner)
     return task
@@ -176,7 +182,10 @@ def _minimum(text: str) -> dict[str, float]:
     parts = dict(part.strip().partition("=")[::2] for part in text.split(","))
     if unknown := [name for name in parts if name not in PHASES or name == TASK]:
         raise argparse.ArgumentTypeError(f"no phase {unknown[0]!r} before the task in {text!r}")
-    return {name: seconds(value) for name, value in parts.items()}
+    found = {name: seconds(value) for name, value in parts.items()}
+    if (longest := max(found.values())) > MAX_MINIMUM_S:
+        raise argparse.ArgumentTypeError(f"{longest:g} s is too long; give at most {MAX_MINIMUM_S} s")
+    return found
 
 
 def shown_phases(arguments: argparse.Namespace) -> tuple[str, ...]:
@@ -195,7 +204,7 @@ def questions_of(arguments: argparse.Namespace) -> tuple[Item, ...]:
     if path is None:
         return ()
     try:
-        asked = tomllib.loads(read_text(path)).get("question") or []
+        asked = read_toml(path).get("question") or []
         items = [
             {"name": f"question_{number}", "kind": "choice", "text": one["text"]}
             | {"choices": one["choices"], "right": one["answer"]}

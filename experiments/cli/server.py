@@ -17,9 +17,9 @@ from datetime import UTC, datetime
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 from experiments.errors import ConfigError, RecordError
+from mjsim.support.urls import parse_url, redacted
 
 PORT = 8000
 BACKLOG = 1024  # maximum number of connections waiting to be accepted
@@ -29,7 +29,7 @@ MAX_FILES = 16384  # limit on open files, including sockets
 def add_server_options(group: Any) -> None:
     group.add_argument("--port", type=number(0, 65535), default=PORT, help="TCP port, or 0 for any free port")
     group.add_argument(
-        "--host", type=_host, default="127.0.0.1", metavar="ADDRESS", help="address to listen on"
+        "--host", type=address, default="127.0.0.1", metavar="ADDRESS", help="address to listen on"
     )
     group.add_argument(
         "--public-url", metavar="URL", help="public URL of the server behind a proxy (docs/deploy.md)"
@@ -128,11 +128,12 @@ def check_public_url(url: str | None) -> None:
     if url is None:
         return
     try:
-        parts = urlsplit(url)
-    except ValueError:  # an address in brackets is incomplete
-        parts = urlsplit("")
-    if parts.scheme not in ("http", "https") or not parts.netloc or parts.path not in ("", "/"):
-        raise ConfigError(f"public URL {url!r} must be of the form https://play.example.org")
+        parts = parse_url(url)
+        alone = not (parts.path.strip("/") or parts.query or parts.fragment or parts.username)
+    except ValueError:
+        alone = False
+    if not alone:
+        raise ConfigError(f"public URL {redacted(url)!r} must be of the form https://play.example.org")
 
 
 def url_of(listener: socket.socket) -> str:
@@ -142,7 +143,7 @@ def url_of(listener: socket.socket) -> str:
     return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"
 
 
-def _host(text: str) -> str:
+def address(text: str) -> str:
     """Refuse an empty address, with which a socket would listen on all addresses."""
     if not text.strip():
         raise argparse.ArgumentTypeError("is empty; name an address, or 0.0.0.0 for all")

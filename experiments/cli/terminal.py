@@ -36,10 +36,12 @@ def error_console() -> "Console":
 
 
 def progress_bars(console: "Console", *columns: "str | ProgressColumn") -> "Progress":
-    """Create progress bars that are hidden unless the console is a terminal."""
+    """Create progress bars. If the console is not a terminal, they print a line every few seconds instead."""
     from rich.progress import Progress
 
-    return Progress(*columns, console=console, disable=not console.is_terminal)
+    from experiments.cli.progress_lines import ProgressLines
+
+    return Progress(*columns, console=console) if console.is_terminal else ProgressLines(console=console)
 
 
 def counting_bars(label: str, *columns: "str | ProgressColumn") -> "Progress":

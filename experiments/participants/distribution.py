@@ -11,7 +11,6 @@ field_of_view = 1.2                                 # the same value for each pa
 import functools
 import math
 import statistics
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import msgspec
 
 from experiments.errors import ConfigError, shown
-from mjsim.support.files import read_text
+from mjsim.support.toml import TomlError, parse_toml, read_toml
 
 if TYPE_CHECKING:
     import numpy as np
@@ -184,14 +183,14 @@ class Distributions(Mapping[str, Distribution]):
         """Read distributions from an inline TOML table or a TOML file. Raises ConfigError if this fails."""
         try:
             if text.lstrip().startswith("{"):
-                return cls.of(tomllib.loads(f"person = {text}")["person"])
-            return cls.of(tomllib.loads(read_text(Path(text))))
+                return cls.of(parse_toml(f"person = {text}")["person"])
+            return cls.of(read_toml(Path(text)))
         except OSError as error:
             raise ConfigError(
                 f"cannot read {text}: {error.strerror}; name a TOML file, or give values between braces, such as "
                 "'{walking_speed = 1.2}'"
             ) from error
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        except TomlError as error:
             raise ConfigError(f"{text!r} is not a description of people in TOML: {error}") from error
 
     def as_dict(self) -> dict[str, Any]:

@@ -24,12 +24,12 @@ class Mismatch:
     """A difference that was found while verifying a record.
 
     Attributes:
-        step: First control step that is affected.
+        step: First control step that is affected, or None if the steps agree and only a file differs.
         message: Description of the difference.
         file: Name of the file that differs.
     """
 
-    step: int
+    step: int | None
     message: str
     file: str
 
@@ -37,31 +37,30 @@ class Mismatch:
 def damage(record: Record) -> list[Mismatch]:
     """Check the lengths and hashes in a record. Return the mismatches, sorted by control step."""
     checks = (_lengths, _actions, _log, _checkpoints, _lines, _settings)
-    return sorted((m for check in checks for m in check(record)), key=lambda mismatch: mismatch.step)
+    return sorted((m for check in checks for m in check(record)), key=lambda mismatch: mismatch.step or 0)
 
 
 def derived_mismatches(directory: Path, record: Record) -> Iterator[Mismatch]:
     """Yield the differences between the stored plans and metrics and those computed from the record."""
     plans = record.plans
-    yield from _derived(directory, record, records.PLAN, lambda found: _plan_fault(found, plans))
-    yield from _derived(directory, record, records.METRICS, lambda found: _metrics_fault(found, record))
+    yield from _derived(directory, records.PLAN, lambda found: _plan_fault(found, plans))
+    yield from _derived(directory, records.METRICS, lambda found: _metrics_fault(found, record))
 
 
-def checksum_mismatches(directory: Path, record: Record) -> Iterator[Mismatch]:
+def checksum_mismatches(directory: Path) -> Iterator[Mismatch]:
     """Yield a mismatch for each file of a run that is missing, added or changed."""
-    last = record.steps - 1
     try:
         sums = read_checksums(directory)
     except RecordError as error:
-        yield Mismatch(last, str(error), CHECKSUMS)
+        yield Mismatch(None, str(error), CHECKSUMS)
         return
     for name in sorted({*sums, *(name for name in records.FILES if (directory / name).is_file())}):
         if name not in sums:
-            yield Mismatch(last, f"{name} was not written with the run: {CHECKSUMS} does not name it", name)
+            yield Mismatch(None, f"{name} was not written with the run: {CHECKSUMS} does not name it", name)
         elif not (directory / name).is_file():
-            yield Mismatch(last, f"{name} is missing; it was written with the run", name)
+            yield Mismatch(None, f"{name} is missing; it was written with the run", name)
         elif sha256_of(directory / name) != sums[name]:
-            yield Mismatch(last, f"{name} is not the file that was written: its SHA-256 is another", name)
+            yield Mismatch(None, f"{name} is not the file that was written: its SHA-256 is another", name)
 
 
 def check_log(directory: Path) -> None:
@@ -164,9 +163,7 @@ def _settings(record: Record) -> Iterator[Mismatch]:
         yield Mismatch(0, message, records.EVENTS)
 
 
-def _derived(
-    directory: Path, record: Record, name: str, fault: Callable[[Any], str | None]
-) -> Iterator[Mismatch]:
+def _derived(directory: Path, name: str, fault: Callable[[Any], str | None]) -> Iterator[Mismatch]:
     if not (directory / name).exists():
         return
     try:
@@ -174,7 +171,7 @@ def _derived(
     except RecordError as error:
         wrong = str(error)
     if wrong is not None:
-        yield Mismatch(record.steps - 1, f"{name} {wrong}", name)
+        yield Mismatch(None, f"{name} {wrong}", name)
 
 
 def _plan_fault(found: Any, plans: Any) -> str | None:

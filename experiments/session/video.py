@@ -3,6 +3,7 @@
 import hashlib
 import queue
 import threading
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Self
@@ -11,7 +12,7 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.errors import RecordError
+from experiments.errors import ConfigError, RecordError
 
 Image = NDArray[np.uint8]
 QUEUE_LENGTH = 8  # maximum number of frames that wait to be encoded
@@ -90,3 +91,12 @@ class VideoWriter:
                 self._hash.update(np.ascontiguousarray(frame).data)
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
             container.mux(stream.encode())
+
+
+def check_film(path: Path) -> None:
+    """Raise ConfigError if a file is missing or is not an MP4 video."""
+    fault = "is not an MP4 video" if path.is_file() else "does not exist"
+    with suppress(OSError, ValueError), path.open("rb") as file, av.open(file) as film:  # or errors of FFmpeg
+        fault = "" if "mp4" in film.format.name and film.streams.video else fault
+    if fault:
+        raise ConfigError(f"film {path} {fault}; leave out --film, or name an MP4 file")

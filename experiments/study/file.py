@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 from typing import Annotated, Any, Literal
-from urllib.parse import urlsplit
 
 import msgspec
 
@@ -22,6 +21,7 @@ from experiments.trials.trial_config import SEEDS, TrialConfig
 from experiments.visit.plan import COMPLETION, CONSENT, PHASES, PLAYED, Count, Device, Limits, Seconds
 from experiments.visit.texts import Texts, read_texts, story_file
 from mjsim.support.files import read_bytes
+from mjsim.support.urls import parse_url
 
 TEMPLATE = Path(__file__).with_name("template.toml")
 PLATFORMS = ("link", "lab", "prolific", "connect", "external-question")
@@ -62,9 +62,14 @@ class Recruitment(_Table, frozen=True):
     api_url: str = ""  # URL of the platform's API, or empty for the default
 
     def __post_init__(self) -> None:
-        url = urlsplit(self.api_url)
-        if self.api_url and (not url.hostname or url.scheme not in ("http", "https")):
-            raise ValueError(f"api_url is {self.api_url!r}; write it as https://HOST or https://HOST/PATH")
+        if not self.api_url:
+            return
+        try:
+            url = parse_url(self.api_url)
+        except ValueError:
+            raise ValueError(
+                f"api_url is {self.api_url!r}; write it as https://HOST or https://HOST/PATH"
+            ) from None
         if url.scheme == "http" and url.hostname not in HERE:
             raise ValueError(f"api_url is {self.api_url!r}; it gets a secret, so it must begin with https://")
 

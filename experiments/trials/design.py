@@ -205,6 +205,8 @@ def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
 def house_names(houses: str | list[str]) -> list[str]:
     """Return a list of house names, in which ranges such as `generated:0:200?split=test` are expanded."""
     if isinstance(houses, list):
+        if not houses:
+            raise ConfigError("houses is empty; name houses, or leave it out")
         return [name for entry in houses for name in house_names(entry)]
     return generated_names(houses) if is_generated(houses) else [houses]
 

@@ -22,7 +22,7 @@ from mjsim.formats.scene.source_scene import (
     left_out,
 )
 from mjsim.formats.scene.surface import Floats, Surface
-from mjsim.house.catalogue.model_files import read_model
+from mjsim.house.catalogue.model_files import check_replicates, elements, read_model
 from mjsim.house.compiled.sites import PREFIX, RoomMap
 from mjsim.values.errors import AssetError
 
@@ -38,6 +38,10 @@ _GEOM = mujoco.mjtGeom
 
 def read_mjcf(path: Path, options: HouseOptions) -> SourceScene:
     """Read an MJCF scene. Raise `AssetError` if it does not compile or refers to a missing mesh."""
+    try:
+        check_replicates(elements(path))
+    except ValueError as error:
+        raise AssetError(f"cannot read model {path}: {error}") from error
     spec = read_model(path)
     missing = MissingFiles(options.skip_missing)
     _without_missing_meshes(spec, path, missing)

@@ -3,7 +3,6 @@
 import json
 import math
 import re
-import tomllib
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -12,6 +11,7 @@ from mjsim.generator.palette import surfaces
 from mjsim.generator.recipe import RECIPE, Recipe
 from mjsim.generator.shell import shell
 from mjsim.generator.values import Asset, Furnishing
+from mjsim.support.toml import read_toml
 
 # Model that provides default classes, materials, categories and objects for all generated houses.
 STYLE = "houses/apartment"
@@ -122,7 +122,7 @@ def used_materials(world: str, own: list[str], brought: Iterable[Asset], models:
 def _catalogue(recipe: Recipe, furnishing: Furnishing, models: Path) -> str:
     plan = recipe.plan
     points = max(POINTS[0], min(POINTS[1], math.floor(POINTS_PER_M2 * plan.area)))
-    source = tomllib.loads((models / STYLE / "catalogue.toml").read_text(encoding="utf-8"))
+    source = read_toml(models / STYLE / "catalogue.toml")
     mounts = {mount.receptacle: mount for mount in furnishing.mounts}
     categories = {k: c for k, c in source["categories"].items() if c["receptacle"] in mounts}
     objects = [key for category in categories.values() for key in category["objects"]]

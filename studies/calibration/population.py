@@ -1,6 +1,5 @@
 """Populations of simulated participants with free parameters, as described in studies/calibration.toml."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import ConfigError
 from experiments.participants.distribution import Distribution, Distributions, distribution
-from mjsim.support.files import read_text
+from mjsim.support.toml import TomlError, read_toml
 
 FILE = Path(__file__).parents[1] / "calibration.toml"
 Values = NDArray[np.float64]
@@ -66,12 +65,12 @@ def read_free_parameters(path: Path = FILE) -> FreeParameters:
         ConfigError: The file cannot be used. The message names it.
     """
     try:
-        file = tomllib.loads(read_text(path))
+        file = read_toml(path)
         found = FreeParameters(
             {name: distribution(name, given) for name, given in file["free"].items()}, file["population"]
         )
         found.inputs()
-    except (OSError, tomllib.TOMLDecodeError, KeyError, ConfigError) as error:
+    except (OSError, TomlError, KeyError, ConfigError) as error:
         raise ConfigError(f"cannot use {path}: {error}") from error
     return found
 

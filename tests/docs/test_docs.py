@@ -19,18 +19,25 @@ import pytest
 from example_house import write_example_house
 from nbclient import NotebookClient
 from planning_cases import random_problem
+from starlette.datastructures import ImmutableMultiDict
 
 from experiments.analysis.study.measures import FILE as MEASURES
 from experiments.cli.main import main
+from experiments.participants.base import Percept
 from experiments.participants.distribution import Distributions
 from experiments.participants.guest import PARAMETERS
 from experiments.session.familiarise import STORY_FILE
 from experiments.session.own_planner import planner_named
+from experiments.study.file import TEMPLATE, read_people_study
+from experiments.study.plan import plan_of
 from experiments.trials.person import PARAMETERS as PERSON
 from experiments.trials.person import check_person
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
+from experiments.visit import Again, Phase, Visitor
+from experiments.visit.phases import phases_of
 from hud.conditions import CONDITIONS, OPTIONS, condition
+from hud.task import TaskView
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.values.person_parameters import RANGES
 from tools.data_dictionary import data_dictionary
@@ -270,3 +277,53 @@ def test_the_example_of_the_api_page_walks():
     exec(compile(code, "docs/api.md", "exec"), names)
     start, position = names["episode"].start, names["step"].observation.position
     assert 0 < math.dist((start.x, start.y), position[:2]) < 0.1
+
+
+def fields_in_table(name, head):
+    """Names in the first column of the table that follows a sentence."""
+    table = page(name).split(head, 1)[1].split("\n\n")[1]
+    cells = [line.split("|")[1] for line in table.splitlines()[2:]]
+    return {re.sub(r"\(.*\)", "", field) for cell in cells for field in re.findall(r"`([^`]+)`", cell)}
+
+
+def public(kind):
+    own = {
+        name for name in (*vars(kind), *getattr(kind, "__dataclass_fields__", {})) if not name.startswith("_")
+    }
+    return own | {name for name in vars(kind).get("__annotations__", {}) if not name.startswith("_")}
+
+
+def test_the_tables_of_fields_are_complete():
+    by_init = {
+        "time",
+        "position",
+        "heading",
+        "pitch",
+        "hands",
+        "hands_full",
+        "busy",
+        "targets",
+        "answer",
+        "blocked",
+    }
+    percept = fields_in_table("participants.md", "named by the keys of the episode")
+    assert percept == public(Percept) | by_init | {"person"}
+    assert fields_in_table("hud.md", "A `TaskView` contains everything") == public(TaskView)
+    assert fields_in_table("study-file.md", "For a page of another kind") == public(Phase) | {"example"}
+    assert all(f"`{name}`" in page("study-file.md") for name in public(Visitor))
+
+
+def test_the_phase_of_the_study_file_page_runs_from_its_texts(tmp_path, monkeypatch):
+    """Class, line of the study file, and texts, as printed."""
+    [code] = [block for block in blocks("study-file.md", "python") if "FormPhase" in block]
+    *_, phases, texts = blocks("study-file.md", "toml")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "mood.py").write_text(code)
+    (tmp_path / "my_texts.toml").write_text(texts)
+    (tmp_path / "study.toml").write_text(re.sub("# texts = .*", phases, TEMPLATE.read_text()))
+    plan = plan_of(read_people_study(tmp_path / "study.toml"))
+    [mood] = [phase for phase in phases_of(plan) if phase.name == "mood:Mood"]
+    page = mood.page(Visitor({}, 0.0, 0, "/play/x"))
+    assert page.template == "form" and page.values["section"]["title"] == "Your mood"
+    assert isinstance(mood.read(Visitor({}, 0.0, 0, "/play/x"), ImmutableMultiDict()), Again)
+    assert mood.read(Visitor({}, 0.0, 0, "/play/x"), ImmutableMultiDict(calm="2")).answers == {"calm": 2}

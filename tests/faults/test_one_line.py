@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import shutil
 import subprocess
 import sys
 import warnings
@@ -11,7 +12,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from experiments.cli.failures import INTERNAL_ERROR, _report_text
+from experiments.cli.failures import INTERNAL_ERROR, _report_text, message
 from experiments.cli.main import main
 from faults.conftest import PROBLEM, ROOT, one_line
 
@@ -28,6 +29,11 @@ def problem(tmp_path):
     [
         (MemoryError("Unable to allocate 9 TiB"), 1, "not enough memory (Unable to allocate 9 TiB)"),
         (OSError(errno.ENOSPC, "No space left on device", "/a"), 1, "/a: No space left on device"),
+        (
+            shutil.Error([("a", "b", "[Errno 28] No space left: 'b'")]),
+            1,
+            "mjsim: [Errno 28] No space left: 'b'",
+        ),
         (ImportError("libGL.so.1: cannot open"), 1, "libGL.so.1: cannot open; `mjsim doctor`"),
         (ValueError("embedded null byte"), 2, "a path has a null character in it"),
         (KeyError("x"), INTERNAL_ERROR, "internal error (KeyError: 'x')"),
@@ -52,10 +58,22 @@ def test_a_report_says_what_is_needed_and_no_secrets(problem, tmp_path, capsys, 
     assert main(["plan", problem + ".gone", "--planner", "greedy"]) == INTERNAL_ERROR
     report = Path(capsys.readouterr().err.split()[-1]).read_text()
     assert "Traceback" in report and "--planner greedy" in report and "mujoco 3." in report
-    # No command of today has a secret.
-    report += _report_text(
-        ValueError("x"), ["fly", "--api-token", "sesame", "--password=sesame", "--port", "1"]
-    )
+    url = "postgresql://ada:sesame@host/study?password=sesame"
+    words = [
+        "--api-token",
+        "sesame",
+        "--password=sesame",
+        "--port",
+        "1",
+        "--database",
+        url,
+        f"--database={url}",
+    ]
+    report += _report_text(ValueError(f"cannot reach {url}"), ["fly", *words])
+    report += message(ValueError(f"cannot reach {url}"))
+    with pytest.raises(SystemExit):
+        main(["plan", problem, url])
+    report += capsys.readouterr().err
     assert "sesame" not in report and "--port 1" in report
 
 

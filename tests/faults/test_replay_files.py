@@ -128,7 +128,7 @@ def is_json(value):
 def derived_faults(folder):
     """What is wrong with files that follow from log and trajectory; needs no simulation."""
     record = read_run(folder)
-    found = [*derived_mismatches(folder, record), *checksum_mismatches(folder, record)]
+    found = [*derived_mismatches(folder, record), *checksum_mismatches(folder)]
     return "; ".join(mismatch.message for mismatch in found)
 
 

@@ -18,6 +18,7 @@ from studies import score_rules
 from studies.prediction import log_score, prediction_interval
 from studies.published import Direction, inconsistencies, read_published
 from studies.score import DIRECTION, EFFECT_SIZE, INFERENCE, VARIANCE, score
+from studies.score_files import how
 from studies.score_population import draw
 from studies.truth import true_studies
 
@@ -232,6 +233,16 @@ def test_small_studies_without_an_effect_agree_with_none(people, effect):
     statistic = high / (1 - high) * df2 / df1
     assert stats.f.cdf(statistic, df1, df2) > 0.95
     assert stats.ncf.cdf(statistic, df1, df2, 0.5 * people) < 0.2  # a large effect does not
+
+
+def test_log_scores_have_the_truth_as_a_yardstick(people):
+    """Studies with the published effects score about as the study that has them, and better than another one."""
+    found = score(people, PUBLISHED)
+    same = {**people.columns, "distance": np.random.default_rng(0).normal(size=len(people.rows))}
+    assert len(found.log_truths) == 3 and max(found.log_truths) < 0
+    assert min(found.log_truths) > score(replace(people, columns=same), PUBLISHED).log_score()
+    low, high = np.quantile(found.log_truths, [0.05, 0.95])
+    assert f"`the truth`: {low:.1f} to {high:.1f})" in how(found)
 
 
 def test_log_scores_are_of_the_noncentral_f():

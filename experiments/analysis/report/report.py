@@ -5,9 +5,20 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.analysis.page import Block, Paragraph, TableBlock, freedom, p_value, page, shown, table
+from experiments.analysis.page import (
+    Block,
+    Paragraph,
+    TableBlock,
+    freedom,
+    p_text,
+    p_value,
+    page,
+    shown,
+    table,
+)
 from experiments.analysis.report.assumptions import assumptions, specification_curve
 from experiments.analysis.report.figures import answers, by_condition, interactions, paths_figure, variances
+from experiments.analysis.report.summary import summary
 from experiments.analysis.statistics.effects import FTest
 from experiments.analysis.statistics.mixed import MixedModel
 from experiments.analysis.statistics.models import OrdinalModel
@@ -39,7 +50,7 @@ REHEARSAL = (
 TEST_HEAD = ("measure", "test", "effect", "objects", "F", "df", "p", "partial η²", "90 % interval")
 PAIR_HEAD = (
     *("measure", "objects", "pair", "difference", "95 % interval", "Tukey p", "Games-Howell p", "Holm p"),
-    *("g", "95 % interval", "equivalence p", "verdict"),
+    *("decisions at .05", "g", "95 % interval", "equivalent within ±", "equivalence Holm p", "verdict"),
 )
 
 
@@ -67,11 +78,12 @@ def report(analysis: Analysis, folder: Path, selection: Selection) -> str:
 
 def _summary(analysis: Analysis) -> Iterator[Block]:
     labels = _labels(analysis)
+    yield from map(Paragraph, summary(analysis, labels))
     effects, pairs = [], []
     for name, objects in ((n, o) for n in labels for o in (*analysis.table.levels(), None)):
         result = analysis.find(name, ONE_WAY if objects else TWO_WAY, objects)
         for effect, t in _f_tests([result] if result else []):
-            shown_test = f"F({freedom(t)}) = {shown(t.statistic)}, p {p_value(t.p)}"
+            shown_test = f"F({freedom(t)}) = {shown(t.statistic)}, {p_text(t.p)}"
             effects.append((labels[name], effect, objects or "all", t.eta_squared, t.interval, shown_test))
         compared = analysis.find(name, "pairs", objects)
         for p in compared.value if compared is not None and compared.value else ():
@@ -188,7 +200,8 @@ def _pairs(analysis: Analysis) -> tuple[Block, ...]:
     for result in (r for r in analysis.results if r.kind == "pairs" and r.value):
         for p in result.value:
             corrected = (p_value(p.tukey_p), p_value(p.games_howell_p), p_value(p.holm_p))
-            size = (p.g, p.g_interval, p_value(p.equivalence_p), p.verdict)
+            same = "the same" if p.agrees() else "differ"
+            size = (same, p.g, p.g_interval, p.equivalence_bound, p_value(p.equivalence_holm_p), p.verdict)
             pair = f"{p.second} - {p.first}"
             rows.append(
                 (names[result.measure], result.objects, pair, p.difference, p.interval, *corrected, *size)
@@ -196,7 +209,10 @@ def _pairs(analysis: Analysis) -> tuple[Block, ...]:
     bound = analysis.measures.equivalence.pair
     about = Paragraph(
         f"Equivalent: Tukey's test finds no difference, and two one-sided tests show that it is below {bound:g} "
-        "standard deviations. Undecided: neither is shown; that is no evidence of no effect."
+        "standard deviations (in the unit of the measure: equivalent within). Undecided: neither is shown; that is no "
+        "evidence of no effect. All p values are corrected for the pairs of one measure and number of objects. "
+        "Tukey's test assumes equal variances. Games-Howell and Holm, after Welch's tests, do not; where they differ "
+        "from Tukey's test and the variances are unequal, rely on them."
     )
     return (TableBlock(PAIR_HEAD, rows), *([about] if rows else []))
 
@@ -209,7 +225,8 @@ def _mixtures(analysis: Analysis) -> tuple[Block, ...]:
         for m in r.value
     ]
     about = Paragraph(
-        "Mixtures of beta-binomial distributions of accepted visits; the smallest BIC fits best."
+        "Mixtures of beta-binomial distributions of accepted visits, for conditions that show a plan. The smallest BIC "
+        "fits best."
     )
     head = ("condition", "kinds", "shares", "mean acceptance", "log likelihood", "BIC")
     return (about, TableBlock(head, rows)) if rows else ()
@@ -250,7 +267,8 @@ def _houses(analysis: Analysis) -> Iterator[Block]:
     found, labels = analysis.table, _labels(analysis)
     rooms, area, density = found.numbers(ROOMS), found.numbers("area_m2"), found.densities()
     rows = []
-    for count in sorted(set(rooms[~np.isnan(rooms)].tolist())):
+    is_one = len({row.get("house") for row in found.rows}) < 2  # perhaps in several layouts
+    for count in sorted(set() if is_one else set(rooms[~np.isnan(rooms)].tolist())):
         homes = found.take(np.flatnonzero(rooms == count))
         means = (homes.groups(name).get(c) for name in labels for c in found.conditions())
         about = len(set(homes.houses.tolist())), len(homes.rows)

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -32,7 +32,8 @@ class Pair:
         holm_p: p-value of Welch's t test, corrected for all pairs by Holm's method.
         equivalence_bound: Largest difference considered equivalent, in units of the values.
         equivalence_p: p-value of two one-sided Welch tests of equivalence.
-        verdict: `different` by Tukey's test, `equivalent` by the equivalence test, or `undecided`.
+        equivalence_holm_p: The same p-value, corrected for all pairs by Holm's method.
+        verdict: `different` by Tukey's test, `equivalent` by the corrected equivalence test, or `undecided`.
     """
 
     first: str
@@ -46,7 +47,13 @@ class Pair:
     g_interval: Interval | None
     equivalence_bound: float
     equivalence_p: float | None
+    equivalence_holm_p: float | None
     verdict: str
+
+    def agrees(self) -> bool:
+        """Return True if all three tests of the difference decide alike at .05."""
+        found = (self.tukey_p, self.games_howell_p, self.holm_p)
+        return len({p < ALPHA for p in found if p is not None}) == 1
 
 
 def compare_pairs(groups: Mapping[str, Values], bound: float) -> list[Pair]:
@@ -58,25 +65,39 @@ def compare_pairs(groups: Mapping[str, Values], bound: float) -> list[Pair]:
         for a, b in pairs
         if varies(groups[a]) and varies(groups[b])
     }
-    corrected = holm(np.array([test.pvalue for test in welch.values()])) if welch else ()
-    holm_p = dict(zip(welch, map(float, corrected), strict=True))
-    return [_compare(groups, pair, bound, welch.get(pair), holm_p.get(pair)) for pair in pairs]
+    limit = bound * pooled_deviation(groups)
+    different = _corrected({pair: float(test.pvalue) for pair, test in welch.items()})
+    equivalent = {pair: _equivalence_p(groups, pair, limit) for pair in welch}
+    each = (equivalent, different, _corrected(equivalent))
+    return [_compare(groups, pair, limit, welch.get(pair), [p.get(pair) for p in each]) for pair in pairs]
+
+
+def _equivalence_p(groups: Mapping[str, Values], pair: tuple[str, str], limit: float) -> float:
+    from statsmodels.stats.weightstats import ttost_ind
+
+    one, other = (groups[name] for name in pair)
+    return float(ttost_ind(one, other, -limit, limit, usevar="unequal")[0])
+
+
+def _corrected(p: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], float]:
+    return dict(zip(p, map(float, holm(np.array(list(p.values())))), strict=True)) if p else {}
 
 
 def _compare(
-    groups: Mapping[str, Values], names: tuple[str, str], bound: float, welch: Any, holm_p: float | None
+    groups: Mapping[str, Values],
+    names: tuple[str, str],
+    limit: float,
+    welch: Any,
+    p_values: Sequence[float | None],
 ) -> Pair:
-    from statsmodels.stats.weightstats import ttost_ind
-
     one, other = (groups[name] for name in names)
+    equivalence, holm_p, equivalence_holm = p_values
     gap, error, freedom = _difference(groups, *names)
     half = tukey_quantile(len(groups), freedom) * error
-    p, limit = tukey_p(abs(gap) / error, len(groups), freedom), bound * pooled_deviation(groups)
-    howell = equivalence = None
+    p, howell = tukey_p(abs(gap) / error, len(groups), freedom), None
     if welch is not None:  # Games and Howell 1976, doi:10.3102/10769986001002113
         howell = tukey_p(abs(float(welch.statistic)), len(groups), float(welch.df))
-        equivalence = float(ttost_ind(one, other, -limit, limit, usevar="unequal")[0])
-    shown = EQUIVALENT if equivalence is not None and equivalence < ALPHA else UNDECIDED
+    shown = EQUIVALENT if equivalence_holm is not None and equivalence_holm < ALPHA else UNDECIDED
     return Pair(
         *names,
         gap,
@@ -87,6 +108,7 @@ def _compare(
         *hedges_g(one, other),
         limit,
         equivalence,
+        equivalence_holm,
         DIFFERENT if p < ALPHA else shown,
     )
 

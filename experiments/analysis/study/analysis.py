@@ -34,6 +34,7 @@ from experiments.analysis.statistics.pairs import compare_pairs
 from experiments.analysis.study.measures import LIKERT_PREFIX, Measures
 from experiments.analysis.study.table import StudyTable
 from experiments.errors import StatisticsError
+from hud.conditions import hides_plan
 
 ONE_WAY, TWO_WAY = "one-way", "two-way, Type II"
 MIXED, ROOMS, BY_HOUSE = "mixed model", "rooms", "by house"
@@ -243,7 +244,7 @@ def _acceptance(table: StudyTable) -> list[AnalysisResult]:
     if STRICT not in table.columns:
         return [AnalysisResult(STRICT, "acceptance", None, None, f"{STRICT} is not known")]
     results = []
-    for condition in table.conditions():
+    for condition in (name for name in table.conditions() if not hides_plan(name)):
         made = table.visits()
         here = (table.assistance == condition) & ~np.isnan(table.columns[STRICT]) & (made > 0)
         visits = made[here]

@@ -16,6 +16,7 @@ from experiments.record.metrics import CIRCUMSTANCES, Displays, Metrics
 from experiments.trials.designs import FOLDER
 from experiments.trials.trial_config import SETTINGS
 from mjsim.support.files import read_bytes
+from mjsim.support.toml import decode_toml
 
 FILE = FOLDER / "metrics.toml"
 MAX_COLUMNS_SHOWN = 20  # maximum number of columns that are listed in a message
@@ -78,13 +79,13 @@ def read_measures(path: Path = FILE) -> Measures:
         return decoded_measures(read_bytes(path))
     except OSError as error:
         raise ConfigError(f"cannot read measures {path}: {error.strerror}") from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise ConfigError(f"{path}: {error}; {FILE} is an example of such a file") from error
 
 
 def decoded_measures(content: bytes) -> Measures:
-    """Decode the content of a measures file. Raises an error of msgspec if the content is invalid."""
-    return msgspec.toml.decode(content, type=Measures)
+    """Decode the content of a measures file. Raises a ValueError if the content is invalid."""
+    return msgspec.convert(decode_toml(content), Measures)
 
 
 def present_columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -1,7 +1,7 @@
 """`mjsim study check`: check that a study is ready to start."""
 
 import argparse
-import sys
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -47,6 +47,7 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     study = people_study(arguments)
     require_extra("study")
+    from experiments.cli.terminal import error_console, progress_bars
     from experiments.study.plan import plan_of
     from experiments.study.rehearsal.costs import durations, simulate
     from experiments.study.rehearsal.problems import located, problems_of_file, problems_of_length
@@ -59,12 +60,22 @@ def run(arguments: argparse.Namespace) -> int:
     prepare_process()
     pool = WorkerPool(study.cells[0].trial(0).house)
     pool.warm_up()
-    with TemporaryDirectory() as folder:
-        played = simulate(study, Path(folder), lambda name: _progress(f"simulating {name}"))
-    with TemporaryDirectory() as folder:
-        _progress("going through the study")
-        walked = run_until_signal(_walk(study, _recruiter(study), Path(folder), pool, arguments.out))
-    _progress("")
+    with progress_bars(error_console(), "{task.description}") as bars:
+        bar = bars.add_task("check", total=None)
+        with TemporaryDirectory() as folder:
+            played = simulate(
+                study, Path(folder), lambda name: bars.update(bar, description=f"simulating {name}")
+            )
+        with TemporaryDirectory() as folder:
+            walk = _walk(
+                study,
+                _recruiter(study),
+                Path(folder),
+                pool,
+                arguments.out,
+                lambda name: bars.update(bar, description=f"going through the study: {name}"),
+            )
+            walked = run_until_signal(walk)
     seconds = durations(study, phases, walked.words, played)
     rest, tasks = sum(seconds.values()) - seconds["task"], played.tasks.values()
     shortest, longest = rest + min(tasks), rest + max(tasks)
@@ -90,29 +101,33 @@ def _recruiter(study: "Study") -> "Recruiter":
 
 
 async def _walk(
-    study: "Study", recruiter: "Recruiter", folder: Path, pool: "WorkerPool", out: Path | None
+    study: "Study",
+    recruiter: "Recruiter",
+    folder: Path,
+    pool: "WorkerPool",
+    out: Path | None,
+    on_page: Callable[[str], None],
 ) -> "Walked":
     from experiments.study.rehearsal.dry_run import dry_run
     from experiments.study.rehearsal.pictures import BROWSERS, browser, camera, write_contact_sheet
 
-    async def nothing(name: str, url: str) -> None:
-        pass
+    async def note(name: str, _url: str) -> None:
+        on_page(name)
 
     if out is None:
-        return await dry_run(study, recruiter, folder, pool, nothing)
+        return await dry_run(study, recruiter, folder, pool, note)
     if (program := browser()) is None:
         print(f"pictures  none, as no Chromium is installed ({', '.join(BROWSERS)})")
-        return await dry_run(study, recruiter, folder, pool, nothing)
+        return await dry_run(study, recruiter, folder, pool, note)
     async with camera(program, out) as taking:
-        walked = await dry_run(study, recruiter, folder, pool, taking.photograph)
-    _progress("")
+
+        async def photograph(name: str, url: str) -> None:
+            on_page(name)
+            await taking.photograph(name, url)
+
+        walked = await dry_run(study, recruiter, folder, pool, photograph)
     print(f"pictures  {write_contact_sheet(out, taking.taken, study.settings.title)}")
     return walked
-
-
-def _progress(text: str) -> None:
-    if sys.stderr.isatty():
-        print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
 
 
 def _print_length(study: "Study", seconds: dict[str, float], shortest: float, longest: float) -> None:

@@ -1,7 +1,6 @@
 """Subcommands of `mjsim study` that manage study data: collect, export, backup, restore, erase and forget."""
 
 import argparse
-import asyncio
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +17,9 @@ from experiments.cli.study.database import (
     with_store,
 )
 from experiments.errors import ConfigError, RecordError
+from experiments.session.signals import run_until_signal
 from experiments.trials.design import counted
+from mjsim.support.urls import redacted
 
 if TYPE_CHECKING:
     from experiments.visit.store import Store
@@ -173,8 +174,8 @@ def run_restore(arguments: argparse.Namespace) -> int:
     if "://" not in url:
         note_derived(Path(url), "database", Path(url))
         note_derived(arguments.backup, "database", Path(url))
-    asyncio.run(restore(arguments.backup, url if "://" in url else sqlite_url(Path(url))))
-    print(url)
+    run_until_signal(restore(arguments.backup, url if "://" in url else sqlite_url(Path(url))))
+    print(redacted(url))
     return 0
 
 

@@ -70,9 +70,12 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     study = people_study(arguments)
     require_extra("study")
+    from experiments.session.video import check_film
     from experiments.study.rehearsal.report import REPORT
     from experiments.study.rehearsal.run import RehearsalSettings
 
+    if arguments.film is not None:
+        check_film(arguments.film)
     people = arguments.people or study.people
     settings = RehearsalSettings(
         study.sha256, people, arguments.seed, arguments.per_minute, arguments.dropouts, arguments.factor

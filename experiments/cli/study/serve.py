@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from experiments.cli.options import add_command
 from experiments.cli.server import (
     add_server_options,
+    address,
     check_public_url,
     listen,
     locked,
@@ -29,7 +30,6 @@ from experiments.cli.study.database import (
     sqlite_url,
     with_store,
 )
-from experiments.errors import ConfigError
 from experiments.record.phases import FLYTHROUGH
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def add_parser(commands: Any) -> None:
         help="port of these pages (default: none)",
     )
     group.add_argument(
-        "--researcher-host", default="127.0.0.1", metavar="ADDRESS", help="address to listen at"
+        "--researcher-host", type=address, default="127.0.0.1", metavar="ADDRESS", help="address to listen at"
     )
     group.add_argument("--researcher-url", metavar="URL", help="public URL of these pages behind a proxy")
     _add_hosts(commands)
@@ -108,6 +108,7 @@ def _add_hosts(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     study = people_study(arguments)
+    from experiments.session.video import check_film
     from experiments.study.data.copies import INDEX
     from experiments.study.plan import plan_of
     from experiments.visit.phases import phases_of
@@ -116,6 +117,8 @@ def run(arguments: argparse.Namespace) -> int:
         from experiments.study.rehearsal.plan import rehearsed
 
         study = rehearsed(study, arguments.rehearsal)
+    if arguments.film is not None:
+        check_film(arguments.film)
     phases_of(plan_of(study))  # raises an error early if a custom phase or a completion code is missing
     check_public_url(arguments.public_url)
     check_public_url(arguments.researcher_url)
@@ -214,8 +217,6 @@ def _film(study: "Study", arguments: argparse.Namespace) -> Path | None:
     if FLYTHROUGH not in study.settings.phases:
         return None
     if arguments.film is not None:
-        if not arguments.film.is_file():
-            raise ConfigError(f"film {arguments.film} does not exist; leave out --film, or name an MP4 file")
         return Path(arguments.film)
     path: Path = arguments.out / FILM
     if not path.is_file():

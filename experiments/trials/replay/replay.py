@@ -116,7 +116,7 @@ def replay(
     """
     record = read_run(directory)
     if faults := damage(record):
-        faults += checksum_mismatches(directory, record)
+        faults += checksum_mismatches(directory)
         raise mismatch_error(directory, record, faults[0], (), verdicts(directory, record, faults, 0, 0))
     duration = float(record.trajectory["time"][-1])
     if start > round(duration, 6):  # times in the log have 6 decimals
@@ -153,10 +153,10 @@ def _mismatches(replayer: Replayer) -> list[Mismatch]:
     """Return all mismatches of a replay, sorted by control step. Checksum mismatches come last."""
     directory, record = replayer.directory, replayer.record
     simulated = (*phase_mismatches(replayer), *simulated_mismatches(replayer))
-    found = sorted(simulated, key=lambda mismatch: mismatch.step)
+    found = sorted(simulated, key=lambda mismatch: mismatch.step or 0)
     if not found:
         found += derived_mismatches(directory, record)
-    return [*found, *checksum_mismatches(directory, record)]
+    return [*found, *checksum_mismatches(directory)]
 
 
 def _house_of(directory: Path, record: Record, catalogue: str | None) -> House:

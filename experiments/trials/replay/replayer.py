@@ -9,7 +9,7 @@ from experiments.house import House
 from experiments.participants.base import Percept
 from experiments.record.phases import COMPLETE, PHYSICS_ERROR
 from experiments.record.reader import Record
-from experiments.record.records import RECORDING, Event, EventLog
+from experiments.record.records import METRICS, RECORDING, Event, EventLog
 from experiments.record.verify import Mismatch
 from experiments.record.writer import RecordWriter, provenance
 from experiments.session.assistant import Assistant
@@ -153,9 +153,14 @@ def mismatch_error(
 ) -> ReplayError:
     """Return an error that names the control step and the possible causes of a mismatch."""
     timestep = record.start.get("world", {}).get("control_timestep", WorldOptions.control_timestep)
-    where = f"first bad step {mismatch.step} (t = {mismatch.step * float(timestep):.2f} s)"
+    if mismatch.step is None:
+        where = "no step differs, but a file does"
+    else:
+        where = f"first bad step {mismatch.step} (t = {mismatch.step * float(timestep):.2f} s)"
+    is_metrics = mismatch.file == METRICS
+    hint = f"; `mjsim metrics {directory}` computes the metrics again" if is_metrics else ""
     reasons = f" (since it was recorded: {'; '.join(differences)})" if differences else ""
-    line = f"{directory}: {where}: {mismatch.message}{reasons}"
+    line = f"{directory}: {where}: {mismatch.message}{reasons}{hint}"
     return ReplayError(line, mismatch.step, [str(verdict) for verdict in verdicts])
 
 

@@ -15,14 +15,16 @@ from experiments.errors import StoreError
 from experiments.visit.store.engine import Database
 from experiments.visit.store.tables import metadata
 from experiments.visit.store.upgrade import upgrade
+from mjsim.support.files import work_folder
 
 ROWS = 1000  # maximum number of rows per INSERT statement
+TAKEN = "{} is there already: name a new file for the backup."
 
 
 def check_new(path: Path) -> None:
     """Raise StoreError if the backup file already exists."""
-    if path.exists():
-        raise StoreError(f"{path} is there already: name a new file for the backup.")
+    if os.path.lexists(path):
+        raise StoreError(TAKEN.format(path))
 
 
 async def back_up(source: Database, path: Path) -> None:
@@ -31,16 +33,21 @@ async def back_up(source: Database, path: Path) -> None:
     Raises StoreError if the file exists or cannot be written.
     """
     check_new(path)
-    part = path.with_name(f"{path.name}.part")
-    part.unlink(missing_ok=True)
-    target = Database(f"sqlite:///{part}")
-    try:
-        await upgrade(target)
-        await _copy(source, target)
-    finally:
-        await target.close()
-    one_file(part)
-    part.rename(path)
+    with work_folder(path.parent) as folder:  # an interrupted backup leaves no files
+        part = folder / "backup.db"
+        target = Database(f"sqlite:///{part}")
+        try:
+            await upgrade(target)
+            await _copy(source, target)
+        finally:
+            await target.close()
+        one_file(part)
+        try:
+            os.link(part, path)  # unlike a rename, a link does not replace a backup that was made meanwhile
+        except FileExistsError as error:
+            raise StoreError(TAKEN.format(path)) from error
+        except OSError:  # the file system does not support links
+            part.rename(path)
 
 
 def one_file(path: Path) -> None:

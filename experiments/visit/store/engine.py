@@ -18,6 +18,7 @@ from sqlalchemy.util import await_only
 from experiments.errors import StoreError
 from experiments.visit.store.failures import advice, damaged, passes
 from experiments.visit.store.sqlite import sqlite_connection
+from mjsim.support.urls import redacted
 
 T = TypeVar("T")
 _Waiting = tuple[Callable[[AsyncConnection], Awaitable[Any]], asyncio.Future[Any]]
@@ -75,7 +76,7 @@ class Database:
     @property
     def name(self) -> str:
         """The database's URL, without the password."""
-        return self.url.render_as_string(hide_password=True)
+        return redacted(self.url.render_as_string(hide_password=True))
 
     async def close(self) -> None:
         await self._engine.dispose()
@@ -233,11 +234,11 @@ def _parsed(url: str) -> URL:
     try:
         parsed = make_url(url)
         return parsed.set(drivername=DRIVERS[parsed.get_backend_name()])
-    except (ArgumentError, KeyError, NoSuchModuleError) as error:
+    except (ArgumentError, KeyError, NoSuchModuleError, ValueError):  # the cause may contain the password
         raise StoreError(
-            f"{url.partition('://')[0]!r} begins no database URL that is known. Use sqlite:///FILE, "
+            f"{redacted(url)!r} is not a database URL. Use sqlite:///FILE, "
             "mysql://USER:PASSWORD@HOST/NAME or postgresql://USER:PASSWORD@HOST/NAME."
-        ) from error
+        ) from None
 
 
 def _engine(url: URL) -> AsyncEngine:

@@ -9,7 +9,7 @@ import msgspec
 
 from experiments.errors import ConfigError
 from experiments.visit.texts.items import Item
-from mjsim.support.files import read_bytes
+from mjsim.support.toml import read_toml
 
 FOLDER = Path(__file__).parents[2] / "texts"
 _HEADER = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]")
@@ -68,6 +68,10 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
     english = _tables(FOLDER / "en.toml")
     usual = _tables(FOLDER / f"{language}.toml") if known else english
     own = _tables(path) if path else {}
+    custom = {name: table for name, table in own.items() if ":" in name}  # texts of custom phases
+    if untitled := [name for name, table in custom.items() if "title" not in table]:
+        raise ConfigError(f"{path}: [{untitled[0]}] has no title; add one, which is the heading of the page")
+    usual, english = {**usual, **custom}, {**english, **{name: {} for name in custom}}
     for name, table in {} if known else usual.items():
         if missing := sorted(set(table) - set(own.get(name, {}))):
             raise ConfigError(f"{path}: [{name}] lacks {missing[0]!r} in language {language!r}")
@@ -102,10 +106,10 @@ def story_file(language: str) -> Path | None:
 
 def _tables(path: Path) -> dict[str, dict[str, Any]]:
     try:
-        return msgspec.toml.decode(read_bytes(path), type=dict[str, dict[str, Any]])
+        return msgspec.convert(read_toml(path), dict[str, dict[str, Any]])
     except OSError as error:
         raise ConfigError(f"cannot read texts {path}: {error.strerror}") from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise ConfigError(f"{path}: {error}") from error
 
 

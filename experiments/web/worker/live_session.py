@@ -253,7 +253,7 @@ def remove_journal(folder: Path, run: Path) -> None:
     try:
         with Journal(folder / JOURNAL) as journal:
             saved = read_run(run)
-            faults = [mismatch.message for mismatch in checksum_mismatches(run, saved)]
+            faults = [mismatch.message for mismatch in checksum_mismatches(run)]
             if journal.entries and not same_record(saved, read_journal(journal.entries)):
                 faults.append("the run directory differs from the journal")
             if faults:

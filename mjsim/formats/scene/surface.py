@@ -7,10 +7,13 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from mjsim.values.errors import AssetError
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 WELD_DIGITS = 6  # number of decimals to which corners must agree to be merged
+_MAX_BROKEN = 0.01  # largest share of triangles that may be left out because they are not finite
 _MIN_AREA = 1e-13  # minimum area of a triangle with a valid normal, in square metres
 
 
@@ -66,8 +69,15 @@ def joined(surfaces: list[Surface]) -> Surface:
 
 
 def cleaned(surface: Surface) -> tuple[Surface, dict[str, int]]:
-    """Remove invalid, empty and duplicate triangles. Return the new surface and the number of each kind."""
+    """Remove invalid, empty and duplicate triangles. Return the new surface and the number of each kind.
+
+    Raise an AssetError if too many triangles have corners that are not finite.
+    """
     finite = np.asarray(np.isfinite(surface.corners).all(axis=(1, 2)))
+    if (broken := int((~finite).sum())) > _MAX_BROKEN * len(finite):
+        raise AssetError(
+            f"{broken} of {len(finite)} triangles have corners that are not finite numbers; export the mesh again"
+        )
     kept = surface.select(finite)
     edges = np.diff(kept.corners, axis=1)
     _, faces = _welded(kept.corners)
@@ -76,7 +86,7 @@ def cleaned(surface: Surface) -> tuple[Surface, dict[str, int]]:
     _, first = np.unique(np.sort(faces[solid], axis=1), axis=0, return_index=True)
     result = kept.select(solid).select(np.sort(first))
     counts = {
-        "not finite": int((~finite).sum()),
+        "not finite": broken,
         "without area": int((~solid).sum()),
         "duplicate": int(solid.sum()) - len(result),
     }

@@ -1,6 +1,5 @@
 """Read catalogue files and translations of labels."""
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,6 +8,7 @@ import msgspec
 
 from mjsim.house.catalogue.house_ref import CATALOGUE, HouseRef, models_root, parse_house
 from mjsim.support.files import is_file, read_text
+from mjsim.support.toml import TomlError, parse_toml, read_toml
 from mjsim.values.errors import AssetError, brief
 
 MAX_EXTENDS = 20  # maximum number of catalogues in a chain in which each extends the next
@@ -21,9 +21,9 @@ def base_of(house: HouseRef) -> HouseRef | None:
     if house.file is None:
         return None
     try:
-        name = tomllib.loads(read_text(house.file)).get("extends")
+        name = read_toml(house.file).get("extends")
         return parse_house(name, house.file.parent) if isinstance(name, str) else None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
+    except (OSError, TomlError):
         return None  # The error is reported when the catalogue is loaded.
 
 
@@ -54,8 +54,8 @@ def read_tables(house: HouseRef, extended: tuple[Path, ...] = ()) -> tuple[dict[
     path = catalogue_file(house)
     try:
         text = read_text(path)
-        tables = tomllib.loads(text)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        tables = parse_toml(text)
+    except (OSError, ValueError) as error:
         raise AssetError(brief(f"cannot read catalogue {path}: {error}")) from error
     if extended:
         _name_models(tables, path.parent)
@@ -95,7 +95,7 @@ def read_labels(language: str, folders: Iterable[Path]) -> Mapping[str, str]:
     for path in (folder / f"labels.{language}.toml" for folder in folders):
         if is_file(path):
             try:
-                found |= msgspec.convert(tomllib.loads(read_text(path)), dict[str, Label])
-            except (OSError, ValueError, RecursionError) as error:
+                found |= msgspec.convert(read_toml(path), dict[str, Label])
+            except (OSError, ValueError) as error:
                 raise AssetError(brief(f"cannot read labels {path}: {error}")) from error
     return found

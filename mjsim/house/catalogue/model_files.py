@@ -13,6 +13,9 @@ from mjsim.house.catalogue.house_ref import models_root
 from mjsim.support.files import is_file, read_bytes
 from mjsim.values.errors import AssetError
 
+MAX_ELEMENTS = 1_000_000  # maximum number of elements in an MJCF file, including replicated elements
+_ROOTS = ("mujoco", "mujocoinclude")
+
 
 @dataclass(frozen=True, eq=False)
 class ModelFile:
@@ -39,9 +42,26 @@ class ModelFile:
 
     def spec(self) -> mujoco.MjSpec:
         """Return an editable model with absolute asset paths. Raise a ValueError if the file is invalid."""
+        check_replicates(self.elements)
         spec = mujoco.MjSpec.from_file(str(self.path))
         _name_files(spec, self.path.parent)
         return spec
+
+
+def check_replicates(elements: Iterable[ET.Element]) -> None:
+    """Raise a ValueError if the `replicate` elements of an MJCF file create too many elements."""
+    waiting = [(element, 1) for element in elements if element.tag in _ROOTS]
+    total = 0
+    while waiting:
+        element, copies = waiting.pop()
+        count = element.get("count", "") if element.tag == "replicate" else ""
+        copies *= int(count) if count.isdecimal() else 1
+        total += copies
+        if total > MAX_ELEMENTS:
+            raise ValueError(
+                f"its replicate elements create more than {MAX_ELEMENTS} elements; reduce a count"
+            )
+        waiting += [(child, copies) for child in element]
 
 
 def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:

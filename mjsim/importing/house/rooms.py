@@ -1,7 +1,6 @@
 """Find the rooms of an imported house. Unless rooms are given, the floor is split at narrow passages."""
 
 import re
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from scipy.ndimage import binary_dilation, label
 from mjsim.formats.scene.source_scene import NamedRoom, ScenePiece, merged_rectangles, words_of
 from mjsim.formats.scene.surface import Floats
 from mjsim.importing.house.floor_grid import CELL, FloorGrid, Mask, clearance
-from mjsim.support.files import read_text
+from mjsim.support.toml import read_toml
 from mjsim.values.errors import AssetError, brief
 
 # Half the widths of passages that separate rooms, in metres. All except the first are for large rooms only.
@@ -92,9 +91,8 @@ class _RoomTable(msgspec.Struct, forbid_unknown_fields=True):
 def read_rooms(path: Path) -> tuple[NamedRoom, ...]:
     """Read rooms from a TOML file. Raise an AssetError if the file contains no rooms or invalid ones."""
     try:
-        tables = tomllib.loads(read_text(path))
-        rooms = msgspec.convert(tables.get("rooms", {}), dict[str, _RoomTable])
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+        rooms = msgspec.convert(read_toml(path).get("rooms", {}), dict[str, _RoomTable])
+    except (OSError, ValueError) as error:
         raise AssetError(brief(f"cannot read rooms from {path}: {error}")) from error
     bad = [key for key in rooms if not re.fullmatch(r"[a-z][a-z0-9_]*", key)]
     if bad or not rooms:

@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import tomllib
 import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from mjsim.house.catalogue.house_ref import CATALOGUE, parse_house
 from mjsim.house.compiled.house import compiled_house
 from mjsim.importing.object.model_writer import MODEL
 from mjsim.support.files import exchange, read_text, work_folder, write_text_atomically
+from mjsim.support.toml import parse_toml
 from mjsim.values.errors import AssetError
 
 HELD = 4  # minimum number of identical objects that must fit into a bin
@@ -66,7 +66,7 @@ class HouseExtension:
         if self.path.exists():
             self.catalogue = load_catalogue(str(self.path))
             self._text = read_text(self.path)
-            extended = tomllib.loads(self._text).get("extends")
+            extended = parse_toml(self._text).get("extends")
             if house is not None and extended != _reference(house, folder):
                 owner = extended or self.catalogue.label
                 raise AssetError(f"{self.path} belongs to {owner!r}, not to {house!r}; choose another --out")

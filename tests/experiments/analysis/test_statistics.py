@@ -113,6 +113,24 @@ def test_pairs_agree_with_scipy_and_with_formulas():
         assert pair.equivalence_p == pytest.approx(max(sides), **EXACT)
 
 
+def test_equivalence_is_corrected_for_the_number_of_pairs():
+    rng = np.random.default_rng(4)
+    found = compare_pairs({name: rng.normal(size=90) for name in "abc"}, 0.5)
+    corrected = holm(np.array([pair.equivalence_p for pair in found]))
+    assert [pair.equivalence_holm_p for pair in found] == pytest.approx(corrected, **EXACT)
+    assert [pair.verdict for pair in found] == ["undecided", "undecided", "equivalent"]
+    assert [pair.equivalence_p < 0.05 for pair in found] == [False, True, True], "without a correction"
+
+
+def test_tests_of_a_pair_that_decide_differently_are_marked():
+    """A small group with a large variance: only Tukey's test, which assumes equal variances, finds a difference."""
+    rng = np.random.default_rng(0)
+    found = compare_pairs(
+        {"a": rng.normal(0, 0.3, 60), "b": rng.normal(0.9, 3.0, 12), "c": rng.normal(0, 0.3, 60)}, 0.5
+    )
+    assert [pair.agrees() for pair in found] == [False, True, False]
+
+
 def test_holm_of_a_worked_example():
     """Smallest times 4, next times 3, and so on, never falling (by hand)."""
     assert holm(np.array([0.01, 0.04, 0.03, 0.005])) == pytest.approx([0.03, 0.06, 0.06, 0.02])

@@ -85,6 +85,9 @@ def test_the_overview_names_every_command():
         ([*PLAY, "--assistance", "nonsense"], "no assistance condition"),
         ([*PLAY, "--objects", "0"], "objects is 0"),
         ([*PLAY, "--film", "nothing.mp4"], "film nothing.mp4 does not exist"),
+        ([*PLAY, "--film", DESIGN], "is not an MP4 video"),
+        ([*PLAY, "--public-url", "http://a:99999"], "must be of the form"),
+        ([*PLAY, "--house", "castle"], "no house 'castle'"),
         ([*PLAY, "--public-url", "ftp://x"], "must be of the form"),
         ([*PLAY, "--public-url", "http://[::1"], "must be of the form"),
         ([*PLAY, "--minimum", "flythrough=60"], "refers to the phase flythrough, which is not shown"),
@@ -107,6 +110,47 @@ def test_bad_input_is_named_in_one_line_and_leaves_nothing(arguments, fault, tmp
     assert message.startswith("mjsim: ")
     assert fault in message and len(message) < 700
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        ("--objects 5 generate", "--objects has no effect before generate"),
+        ("--house generated:7 export", "--house has no effect before export"),
+        ("generate --objects 5", "unrecognized arguments: --objects 5"),
+        ("generate --house apartment", "unrecognized arguments: --house apartment"),
+        ("gallery apartment --seed 1", "unrecognized arguments: --seed 1"),
+        ("export --rooms 3", "unrecognized arguments: --rooms 3"),
+        ("export --episodes 0", "'0' is not a number from 1 to"),
+        ("gallery apartment --workers 0", "'0' is not a number from 1 to"),
+        ("gallery", "SOURCE"),
+        ("castle", "invalid choice: 'castle'"),
+    ],
+)
+def test_each_command_of_house_has_its_own_options(words, fault, tmp_path, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["house", *words.split(), "--out", str(tmp_path / "out")])
+    assert stop.value.code == 2 and fault in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("option", ["--objects", "--points", "--seed", "--episodes"])
+def test_a_floor_plan_has_no_objects(option, tmp_path, capsys):
+    out = tmp_path / "plan.json"
+    assert main(["house", "export", "--format", "procthor", option, "1", "--out", str(out)]) == 2
+    assert f"{option} has no effect with --format procthor" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_both_formats_of_one_house_may_be_written_next_to_each_other(tmp_path, capsys):
+    """The commands of docs/import.md: both write the same episode file, but none replaces another one."""
+    words = ["house", "--objects", "2", "--out"]
+    assert main([*words, str(tmp_path / "house.xml")]) == 0
+    assert main([*words, str(tmp_path / "house.glb")]) == 0
+    (tmp_path / "house.glb").unlink()
+    assert main([*words, str(tmp_path / "house.glb"), "--seed", "1"]) == 2
+    assert "house.episode.json exists" in capsys.readouterr().err
+    assert not (tmp_path / "house.glb").exists()
 
 
 def test_a_house_for_stock_mujoco(tmp_path, capsys):
@@ -250,7 +294,18 @@ numpy.ones(1) / numpy.zeros(1)"""
     assert "nowhere.json" in done.stderr and "Warning" not in done.stderr
 
 
-def test_an_empty_host_does_not_mean_all_addresses(capsys):
-    with pytest.raises(SystemExit):
-        main([*PLAY, "--host", ""])
-    assert "is empty; name an address" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        ([*PLAY, "--host", " "], "is empty; name an address"),
+        (["study", "serve", "s.toml", "--out", "x", "--researcher-host", " "], "is empty; name an address"),
+        ([*PLAY, "--host", ""], "an argument is empty"),
+        (["metrics", ""], "an argument is empty"),
+        (["replay", "run", "--assistance="], "an argument is empty"),
+        ([*PLAY, "--minimum", "story=1e99"], "1e+99 s is too long; give at most 86400 s"),
+    ],
+)
+def test_values_that_mean_nothing_are_refused(words, fault, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(words)
+    assert stop.value.code == 2 and fault in capsys.readouterr().err

@@ -60,6 +60,7 @@ def test_cells_may_be_of_unlike_size_and_share_what_all_have(tmp_path):
         ("[[cells]]\nobjects = 6\nassistance = 'none'\npeople = 2\nseeds = '0:3'", "seeds for 3"),
         ("[[cells]]\nobjects = 6\nassistance = 'none'\nseeds = '0:99999999999'", "more than 1000000"),
         ("[[cells]]\nobjects = 6\nassistance = 'none'\nseeds = [-1]", "none below 0"),
+        ("[[cells]]\nobjects = 6\nassistance = 'none'\npeople = 1\nhouses = []", "houses is empty"),
         ("[[cells]]\nobjects = 60\nassistance = 'none'\nseeds = 1", "objects is 60; it must be 1 to 40"),
         (
             "[[cells]]\nobjects = 6\nassistance = 'none'\npeople = 1\nperson = 'x'",

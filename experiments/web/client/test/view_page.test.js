@@ -121,3 +121,23 @@ test("the view from above shows the person and both paths but no ceilings", () =
   camera("person");
   expect(markers()).toEqual(RUN.markers);
 });
+
+test("a lost drawing context pauses the run and says so until the context returns", () => {
+  part("time").value = "0";
+  part("time").dispatchEvent(new Event("input"));
+  part("run").click();
+  later(1000);
+  world.onLost();
+  expect([part("run").textContent, part("debug").textContent]).toEqual(["Play", expect.stringContaining("reload the page")]);
+  const seconds = part("seconds").textContent;
+  later(1000);
+  expect(part("seconds").textContent).toBe(seconds);
+  world.onRestored();
+  expect([part("run").textContent, part("debug").textContent]).toEqual(["Pause", ""]);
+  later(1000);
+  expect(part("seconds").textContent).not.toBe(seconds);
+  part("run").click();
+  world.onLost();
+  world.onRestored();
+  expect(part("run").textContent).toBe("Play");
+});

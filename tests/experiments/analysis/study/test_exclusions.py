@@ -155,7 +155,7 @@ def test_acceptance_counts_the_visits_that_were_made(monkeypatch):
     """Idle people accept nothing; 3 of the 4 visits of one who gave up were as suggested."""
     idle = {"ended": "time limit", "visits": 0, "nd_strict_2n": 0.0}
     gave_up = {"ended": "time limit", "visits": 4, "nd_strict_2n": 1 / 12}
-    rows = made_up_people({("none", 6): 6})
+    rows = made_up_people({("optimal", 6): 6})
     rows[0] |= idle
     rows[1] |= gave_up
     seen = {}

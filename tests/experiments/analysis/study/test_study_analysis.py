@@ -10,8 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 from study_people import SIZES, made_up_people, table_of
 
-from experiments.analysis.page import shown
+from experiments.analysis.page import p_text, shown
 from experiments.analysis.planning.power import MIN_POOL, StudyCost, Wanted, _eta_squared, plan_power
+from experiments.analysis.report.report import _houses
+from experiments.analysis.report.summary import summary
 from experiments.analysis.statistics.effects import people_per_cell
 from experiments.analysis.study import analysis as study_analysis
 from experiments.analysis.study.analysis import analyse
@@ -45,6 +47,49 @@ def test_columns_that_nothing_analyses_are_named():
     rows[-1] |= {"excluded": True, "mood\n": 3}
     *_, note = table_of(rows).notes
     assert note == "These columns of the table are not analysed: 'excluded', 'mood\\n'."
+
+
+def quick_analysis(monkeypatch, rows):
+    """All tests except mixed models, which take long."""
+
+    def left_out(*_):
+        raise StatisticsError("left out")
+
+    monkeypatch.setattr(study_analysis, "mixed_model", left_out)
+    return analyse(table_of(rows), read_measures())
+
+
+def test_acceptance_is_of_conditions_that_show_a_plan(monkeypatch):
+    names = ("none", "highlight-minimap", "none-pointer", "optimal", "own:shown")
+    rows = [row | {"assistance": name} for name in names for row in made_up_people({("none", 6): 6})]
+    found = quick_analysis(
+        monkeypatch, [row | {"person_seed": k, "order_seed": k} for k, row in enumerate(rows)]
+    )
+    kinds = {r.kind for r in found.results if r.kind.startswith("acceptance")}
+    assert kinds == {f"acceptance, {name}" for name in ("none-pointer", "optimal", "own:shown")}
+
+
+def test_the_summary_says_what_was_asked_and_found(monkeypatch):
+    analysis = quick_analysis(monkeypatch, made_up_people(dict.fromkeys(SMALL, 12)))
+    question, deviations, *others = summary(analysis, {"deviations": "Deviations", "time": "Time (s)"})
+    asked = "Question: do people with none, highlight and optimal as assistance differ in Deviations and Time (s)?"
+    assert question == f"{asked} The table has 72 trials with 6 and 12 objects."
+    f_test = r"F\(2, 66\) = [\d.]+, p < \.001, partial η² = 0\.\d+"
+    means = r"none 0\.\d+, highlight 0\.\d+, optimal 0\.\d+"
+    assert re.fullmatch(rf"Deviations: the conditions differ, {f_test}. Means: {means}\.", deviations)
+    assert [p_text(p) for p in (0.0004, 0.4661, 1.0)] == ["p < .001", "p = .466", "p = 1.000"]
+    assert (
+        len(others) == 1 and "Time (s): no difference between the conditions was found, F(2, 66)" in others[0]
+    )
+
+
+@pytest.mark.parametrize("homes", [1, 2])
+def test_one_house_has_no_table_of_houses(monkeypatch, homes):
+    rows = made_up_people({(name, 6): 6 for name in ("none", "optimal")})
+    for k, row in enumerate(rows):
+        row |= {"house": f"home {k % homes}", "rooms": 3 + k % homes, "area_m2": 40.0}
+    by_rooms, _ = _houses(quick_analysis(monkeypatch, rows))
+    assert [row[0] for row in by_rooms.rows] == ([3, 4] if homes > 1 else [])
 
 
 def test_a_model_that_memory_does_not_suffice_for_says_what_to_do(monkeypatch):

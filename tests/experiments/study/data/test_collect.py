@@ -1,7 +1,9 @@
 """The table of a study: a row for each person who has played, with answers, and without ids or formulas."""
 
 import asyncio
+import os
 import shutil
+import signal
 from collections.abc import Mapping
 
 import pytest
@@ -154,6 +156,23 @@ def test_a_person_is_erased_from_database_and_files_and_backups_move_the_rest(tm
     for path in (*folder.rglob("*"), tmp_path / "backup.db"):
         assert not path.is_file() or b"secret-first" not in path.read_bytes()
     assert not (folder / "visits" / ("f" * 64)).exists()
+
+
+def test_a_signal_ends_restoring_in_order(tmp_path, monkeypatch, capsys):
+    ended = []
+
+    async def slow(*_):
+        os.kill(os.getpid(), signal.SIGTERM)
+        try:
+            await asyncio.sleep(60)
+        except asyncio.CancelledError:
+            ended.append("in order")
+            raise
+
+    monkeypatch.setattr("experiments.visit.store.restore", slow)
+    assert main(["study", "restore", "backup.db", str(tmp_path / "study.db")]) == 128 + signal.SIGTERM
+    assert ended == ["in order"]
+    assert capsys.readouterr().err == "mjsim: stopped by SIGTERM. Finished work is kept\n"
 
 
 async def _filled(study_file, folder, run):

@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import select
 
 from experiments.errors import StoreError
-from experiments.visit.store import CellQuota, Store, restore
+from experiments.visit.store import CellQuota, Store, copies, restore
 from experiments.visit.store.tables import metadata
 
 pytestmark = pytest.mark.anyio
@@ -154,3 +154,38 @@ async def test_nobody_is_erased_who_is_owed_something(store, arrive):
     with pytest.raises(StoreError, match="owed r: pay first"):
         await store.erase(person.id, "ada")
     assert await store.person(person.id)
+
+
+async def test_of_two_backups_to_one_file_one_succeeds_and_one_is_refused(
+    store, tmp_path, arrive, monkeypatch
+):
+    """The second begins and ends while the first is under way."""
+    await arrive(1)
+    folder, copy = tmp_path / "backups", copies._copy
+    folder.mkdir()
+
+    async def overtaken(source, target):
+        monkeypatch.setattr(copies, "_copy", copy)
+        await store.backup(folder / "b.db")
+        await arrive(2)
+        await copy(source, target)
+
+    monkeypatch.setattr(copies, "_copy", overtaken)
+    with pytest.raises(StoreError, match=r"b.db is there already: name a new file for the backup"):
+        await store.backup(folder / "b.db")
+    assert [path.name for path in folder.iterdir()] == ["b.db"]
+    with sqlite3.connect(folder / "b.db") as made:
+        assert made.execute("SELECT count(*) FROM person").fetchone() == (1,)
+
+
+@pytest.mark.parametrize("step", ["upgrade", "_copy", "one_file"])
+async def test_a_backup_for_which_the_disk_is_too_small_leaves_nothing(store, tmp_path, step, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    folder = tmp_path / "backups"
+    folder.mkdir()
+    monkeypatch.setattr(copies, step, full)
+    with pytest.raises(OSError, match="No space"):
+        await store.backup(folder / "b.db")
+    assert not list(folder.iterdir())

@@ -223,8 +223,10 @@ async def test_tables_of_another_program_are_left_alone(url):
 @pytest.mark.parametrize(
     ("url", "message"),
     [
-        ("oracle://here", "'oracle' begins no database URL"),
-        ("study.db", "begins no database URL"),
+        ("oracle://here", "'oracle://here' is not a database URL"),
+        ("study.db", "is not a database URL"),
+        ("postgresql://me:secret@[::1/study", r"me:\*\*\*@\[::1/study' is not a database URL"),
+        ("mysql://me:secret@here:many/study", "is not a database URL"),
         ("sqlite://", "name a file"),
         ("sqlite:////nowhere/at/all/study.db", "make it first"),
         ("postgresql://me:secret@127.0.0.1:9/study", "cannot be reached"),

@@ -68,6 +68,16 @@ def test_a_file_that_cannot_be_written_is_refused_first(run, tmp_path, capsys, o
     assert (tmp_path / "old.html").read_text() == "mine"
 
 
+def test_a_run_without_metrics_has_no_bad_step(run, tmp_path, capsys):
+    copy = shutil.copytree(run, tmp_path / "copy")
+    (copy / "metrics.json").unlink()
+    assert main(["view", str(copy), "--out", str(tmp_path / "run.html")]) == 1
+    said = capsys.readouterr().err
+    assert "no step differs, but a file does: metrics.json is missing" in said and "bad step" not in said
+    assert f"`mjsim metrics {copy}` computes the metrics again" in said
+    assert main(["metrics", str(copy)]) == 0, "what the message offers"
+
+
 def test_a_changed_run_is_not_shown(run, tmp_path, capsys):
     copy = shutil.copytree(run, tmp_path / "copy")
     log = (copy / "events.jsonl").read_text()

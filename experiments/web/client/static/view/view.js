@@ -28,11 +28,13 @@ const files = await unpacked("scene-data");
 const run = new Run(recorded);
 const hud = new Hud(() => "E");
 const world = new World3D(canvas);
+const notice = byId("debug", HTMLElement);
 const headset = new HeadsetPage(world, null);
 const orbit = new Orbit(canvas, recorded.bounds);
 /** @type {"person" | "above" | "free"} */
 let camera = "person";
 let playing = false;
+let resumes = false; // whether to play on once a lost drawing context is back
 let time = 0;
 let last = performance.now();
 let shown = -1; // control step whose HUD is shown
@@ -131,6 +133,15 @@ function tick(moment) {
   return mark;
 }
 
+world.onLost = () => {
+  resumes = playing;
+  setPlaying(false);
+  notice.textContent = "The browser stopped drawing. If it does not continue in a few seconds, reload the page.";
+};
+world.onRestored = () => {
+  notice.textContent = "";
+  setPlaying(resumes);
+};
 slider.max = `${run.duration}`;
 slider.addEventListener("input", () => seek(Number(slider.value)));
 play.addEventListener("click", () => setPlaying(!playing));
@@ -153,7 +164,7 @@ await world.setObjects(
   Object.fromEntries([...run.poses(0, 0)].map(({ name, pose }) => [name, { model: recorded.models[name] ?? "", pose }])),
 );
 world.setFieldOfView(recorded.person.field_of_view);
-byId("debug", HTMLElement).textContent = "";
+notice.textContent = "";
 setCamera(/** @type {typeof camera} */ (byId("play", HTMLElement).dataset.cameraFirst || "person"));
 world.resize();
 headset.offer(byId("headset-button", HTMLElement), () => run.body(run.at(time).step, 0)[2] ?? 0);
