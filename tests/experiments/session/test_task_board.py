@@ -56,7 +56,9 @@ def scrolled(board, seen, *rows):
 def test_rows_add_up_within_the_longest_list(board, start):
     assert scrolled(board, start) == 0
     assert scrolled(board, start, 3, -1) == 2
-    assert scrolled(board, start, 100, 100) == 2 * OBJECTS  # the optimal list has a pick and a place per object
+    assert (
+        scrolled(board, start, 100, 100) == 2 * OBJECTS
+    )  # the optimal list has a pick and a place per object
     assert scrolled(board, start, -1) == 2 * OBJECTS - 1, "rows beyond the end do not count"
     assert scrolled(board, start, -100, -100) == -2 * OBJECTS
 
@@ -88,7 +90,11 @@ def test_objects_have_their_places_rooms_and_bins_of_the_moment(board, start, ho
     assert after[0].room == house.rooms.label(house.rooms.room_at(positions[0, :2]))
     status = (ObjectStatus.CARRIED, ObjectStatus.DELIVERED, *start.object_status[2:])
     held = dataclasses.replace(moved, object_status=status, hands=(start.object_names[0], None))
-    assert [o.status for o in board.view(held).objects] == ["carried", "delivered", *["loose"] * (OBJECTS - 2)]
+    assert [o.status for o in board.view(held).objects] == [
+        "carried",
+        "delivered",
+        *["loose"] * (OBJECTS - 2),
+    ]
     assert board.view(start).objects == before
 
 
@@ -108,7 +114,11 @@ def test_a_message_names_the_object_and_its_bin_and_fades(board, start, house, e
     assert expected != message("not_the_receptacle", house.texts)
     for time, opacity in ((1.0, 1.0), (4.5, 1.0), (4.75, 0.5)):
         found = board.view(at(start, time)).message
-        assert (found.text, found.kind, found.opacity) == (expected.text, expected.kind, pytest.approx(opacity))
+        assert (found.text, found.kind, found.opacity) == (
+            expected.text,
+            expected.kind,
+            pytest.approx(opacity),
+        )
     assert board.view(at(start, 5.0)).message is None
     board.show_message("unknown_object", 6.0, "nobody")
     assert board.view(at(start, 6.0)).message == message("unknown_object", house.texts)
@@ -132,7 +142,9 @@ def test_a_success_can_be_read_for_two_seconds_before_the_new_plan_is_announced(
 
 
 @pytest.mark.parametrize(("refused_at", "again"), [(12.5, True), (13.99, True), (14.0, False), (15.0, False)])
-def test_an_announcement_that_a_refusal_interrupts_returns_unless_it_was_read(board, start, house, refused_at, again):
+def test_an_announcement_that_a_refusal_interrupts_returns_unless_it_was_read(
+    board, start, house, refused_at, again
+):
     board.show_message("placed", 10.0)
     board.announce_replan(10.0)
     refusal, announced = (message(key, house.texts).text for key in ("hands_full", "replanned"))

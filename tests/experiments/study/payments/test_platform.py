@@ -33,7 +33,14 @@ def asked(monkeypatch, headers, busy):
 
 @pytest.mark.parametrize(
     ("header", "pause"),
-    [("7", 7.0), ("0", 0.0), ("100000", LONGEST_WAIT), ("", 1.0), ("Wed, 21 Oct 2026 07:28:00 GMT", 1.0), ("-5", 1.0)],
+    [
+        ("7", 7.0),
+        ("0", 0.0),
+        ("100000", LONGEST_WAIT),
+        ("", 1.0),
+        ("Wed, 21 Oct 2026 07:28:00 GMT", 1.0),
+        ("-5", 1.0),
+    ],
 )
 def test_the_platform_says_when_to_ask_again_within_a_minute(monkeypatch, header, pause):
     pauses, answer = asked(monkeypatch, {"Retry-After": header}, busy=2)
