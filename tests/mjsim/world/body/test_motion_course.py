@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small_worlds import do, scene_of, walk_to, world_of
 
+from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.values.actions import IDLE, EventKind, Pick, Place
 from mjsim.values.options import FIDELITIES, REST_STEPS
 from mjsim.world.body.hand_motions import square_heading
@@ -168,10 +169,16 @@ def test_motions_take_as_long_as_their_parts(small_catalogue, fidelity):
     assert 1.0 < place < 2.5
 
 
-def test_the_size_of_a_load_is_measured_from_its_grip(small_catalogue):
-    placed_ = ("cube", 1.6, 1.8), ("wedge", 1.2, 3.2), ("ball", 1.0, 2.4)
-    world = world_of(scene_of(small_catalogue, (1.0, 2.8, 1.5), *placed_))
-    expected = [(math.hypot(0.05, 0.05), 0.1), (math.hypot(0.08, 0.05), 0.08), (math.hypot(0.06, 0.06), 0.12)]
+def test_the_size_of_a_load_is_that_of_its_farthest_corner_from_the_grip(tmp_path, fresh_house):
+    """An object that tapers to the top, where the hand holds it."""
+    wedge = tmp_path / "wedge.xml"
+    text = wedge.read_text(encoding="utf-8")
+    assert "-.08 -.05 .08 -.08 .05 .08" in text
+    tapered = text.replace("-.08 -.05 .08 -.08 .05 .08", "-.02 -.01 .08 .02 .01 .08")
+    wedge.write_text(tapered, encoding="utf-8")
+    catalogue = Catalogue.load(str(fresh_house))
+    world = world_of(scene_of(catalogue, (1.0, 2.8, 1.5), ("wedge", 1.6, 1.8), ("ball", 1.0, 2.0)))
+    expected = [(math.hypot(0.08, 0.05), 0.08), (math.hypot(0.06, 0.06), 0.12)]
     assert world._tier.carrying.loads == pytest.approx(np.array(expected), abs=1e-6)
 
 
