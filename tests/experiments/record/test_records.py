@@ -17,6 +17,7 @@ from experiments.record.journal import Header, Journal, read_entries
 from experiments.record.reader import read_journal
 from experiments.record.records import EPISODE, EVENTS, METRICS, EventLog, read_events
 from experiments.record.run_directory import run_directory
+from experiments.record.verify import damage
 from experiments.record.writer import RecordWriter
 from mjsim.values.actions import Move, Pick, Place
 from mjsim.values.episode import Episode, PlacedObject, StartPose
@@ -163,6 +164,17 @@ def test_the_record_of_a_journal_is_that_in_memory(tmp_path, commits):
     record = read_journal(read_entries(path))
     assert contents(record) == contents(memory.record())
     assert (record.reason, record.participant) == ("all delivered", {"input": 6})
+
+
+def test_an_event_that_was_written_wrongly_is_found_with_its_line_and_step():
+    """Its hash is that of what was written, so only the format tells."""
+    writer, sha256 = new_writer(), hashlib.sha256(EPISODE_OF_TWO.to_json().encode()).hexdigest()
+    told = dict.fromkeys(("format", "model", "versions", "world", "inputs"), {})
+    writer.log.append(0.0, "start", episode_sha256=sha256, objects=2, order=["b", "a"], **told)
+    writer.append(observation(), HealthSample(), 0, Steps(Move()))
+    [found] = damage(writer.record())
+    assert (found.step, found.file) == (0, EVENTS)
+    assert found.message.startswith("line 1: events.jsonl has an invalid event")
 
 
 def test_a_journal_without_control_steps_is_an_empty_record():
