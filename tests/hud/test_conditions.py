@@ -302,6 +302,15 @@ def test_regrets_stand_beside_what_can_be_done_next_and_nowhere_else():
     assert listed["Cardboard box"] == "→ Recycling bin"
 
 
+def test_a_regret_of_a_centimetre_is_shown_as_none_and_a_larger_one_is_rounded_up():
+    plain = sample.task(6)
+    regrets = (0.0, 0.01, 0.0101, 0.1, 0.1001, 1.0)
+    known = (Alternative("pick", o.name, regret) for o, regret in zip(plain.objects, regrets, strict=True))
+    listed = details(shown("none-regret", knowing(plain, *known)))
+    shown_regrets = [listed[o.label].rpartition(" · ")[2] for o in plain.objects]
+    assert shown_regrets == ["+0 m", "+0 m", "+0.1 m", "+0.1 m", "+0.1 m", "+1.0 m"]
+
+
 def test_a_step_that_was_done_and_can_be_done_again_is_noted_once():
     """The mug was dropped, so the plan contains picking it up as a finished and as a possible step."""
     plain = sample.task(6, steps=1)
