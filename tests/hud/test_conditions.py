@@ -6,7 +6,6 @@ import hud_sample as sample
 import numpy as np
 import pytest
 
-from hud.builtin_options import REROUTE_CLEARANCE
 from hud.compose import Compositor, compose
 from hud.conditions import CONDITIONS, OPTIONS, condition
 from hud.errors import ConditionError, HudError, MessageError, TaskViewError
@@ -134,7 +133,7 @@ def test_guided_is_optimal_with_its_options():
     assert state.pointer is not None and state.rerouted
     assert view.path is not None
     assert tuple(m for m in state.markers if m.role == "breadcrumb") == breadcrumbs(
-        view.path, view.eye_height, REROUTE_CLEARANCE
+        view.path, view.eye_height, 0.5
     )
     assert {"reroute", "rims", "pin", "pointer", "bins", "minimap", "regret", "xray"} == set(OPTIONS)
 
@@ -309,6 +308,14 @@ def test_a_regret_of_a_centimetre_is_shown_as_none_and_a_larger_one_is_rounded_u
     listed = details(shown("none-regret", knowing(plain, *known)))
     shown_regrets = [listed[o.label].rpartition(" · ")[2] for o in plain.objects]
     assert shown_regrets == ["+0 m", "+0 m", "+0.1 m", "+0.1 m", "+0.1 m", "+1.0 m"]
+
+
+def test_a_list_whose_rows_are_no_steps_shows_no_regrets(own_module):
+    """A condition of the user's own lists what it wants to."""
+    text = "from hud.lists import assemble\ndef hud_state(view):\n    return assemble(view, 'Mine', ())\n"
+    own_module(text, "own_list")
+    view = knowing(sample.task(6), Alternative("pick", "object_00", 5.0))
+    assert shown("own_list:hud_state-regret", view) == shown("own_list:hud_state", view)
 
 
 def test_a_step_that_was_done_and_can_be_done_again_is_noted_once():

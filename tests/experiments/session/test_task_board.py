@@ -1,11 +1,12 @@
 """The task as conditions see it: scrolling, completed steps, messages, and where the objects are."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from experiments.session.task_board import TaskBoard
+from experiments.session.task_board import PlanView, TaskBoard
 from hud.messages import message
 from mjsim.values.observation import ObjectStatus, Observation
 from planner.plan import Visit, VisitKind
@@ -153,3 +154,30 @@ def test_an_announcement_that_a_refusal_interrupts_returns_unless_it_was_read(
     assert text_at(board, start, refused_at) == refusal
     assert text_at(board, start, refused_at + 1.99) == refusal
     assert text_at(board, start, refused_at + 2.0) == (announced if again else refusal)
+
+
+def test_a_plan_is_shown_by_its_steps_its_paths_and_its_goal(board, start):
+    first, second = start.object_names[:2]
+    visits = (Visit(PICK, first), Visit(PICK, second), Visit(PLACE, second))
+    asked, points = [], np.array([[0.0, 0.0], [1.0, 1.0]])
+    paths = SimpleNamespace(
+        segment=SimpleNamespace(points=points), path=SimpleNamespace(ahead=lambda position: position[None])
+    )
+
+    def paths_to(visit):
+        asked.append(visit)
+        return paths
+
+    shown = PlanView(board, start, lambda: SimpleNamespace(visits=visits, next=visits[0]), paths_to)
+    view = board.view(start, ahead=shown)
+    assert asked == [], "nothing is computed for a condition that shows no plan"
+    assert view.plan == (("pick", first), ("pick", second), ("place", second))
+    assert view.segment is points and view.path.tolist() == [start.position.tolist()]
+    assert view.goal == tuple(start.object_positions[0])
+    assert set(asked) == {visits[0]}
+
+
+@pytest.mark.parametrize("route", [None, SimpleNamespace(visits=(), next=None)])
+def test_without_a_next_visit_there_is_nothing_to_show(board, start, route):
+    view = board.view(start, ahead=PlanView(board, start, lambda: route, lambda _: pytest.fail("no visit")))
+    assert (view.plan, view.segment, view.path, view.goal) == ((), None, None, None)
