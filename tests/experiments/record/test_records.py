@@ -169,7 +169,7 @@ def test_the_record_of_a_journal_is_that_in_memory(tmp_path, commits):
 def test_an_event_that_was_written_wrongly_is_found_with_its_line_and_step():
     """Its hash is that of what was written, so only the format tells."""
     writer, sha256 = new_writer(), hashlib.sha256(EPISODE_OF_TWO.to_json().encode()).hexdigest()
-    told = dict.fromkeys(("format", "model", "versions", "world", "inputs"), {})
+    told = {key: {} for key in ("format", "model", "versions", "world", "inputs")}
     writer.log.append(0.0, "start", episode_sha256=sha256, objects=2, order=["b", "a"], **told)
     writer.append(observation(), HealthSample(), 0, Steps(Move()))
     [found] = damage(writer.record())
