@@ -1,5 +1,7 @@
 """Check that OR-Tools and the greedy solver return feasible and repeatable plans."""
 
+import threading
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -66,6 +68,22 @@ def test_the_same_work_gives_the_same_plan():
     problem = random_problem(5, 12, 1, bins=6)
     first, second = (solver("ortools").solve(problem, seed=1, limit=SolveLimit(work=50)) for _ in range(2))
     assert (first.visits, first.cost) == (second.visits, second.cost)
+
+
+def test_a_search_asks_whether_to_stop_and_then_returns_a_plan():
+    class StopsSoon(threading.Event):
+        """An event that is set by another thread after it was asked for five times."""
+
+        asked = 0
+
+        def is_set(self):
+            self.asked += 1
+            return self.asked > 5
+
+    problem, stop = random_problem(5, 12, 1, bins=6), StopsSoon()
+    plan = solver("ortools").solve(problem, limit=SolveLimit(work=50, stop=stop))
+    check(problem, plan)
+    assert stop.asked > 5
 
 
 def test_everything_in_one_place_still_ends():

@@ -84,6 +84,12 @@ def test_other_capacities_are_solved_visit_by_visit():
         assert r.cost == pytest.approx(costs[r.visit], abs=5e-3)
 
 
+def test_regrets_of_other_capacities_start_with_the_best_visit():
+    found = regrets(random_problem(4, 4, 1, capacity=3), TABLE)
+    assert found[0].regret == 0.0 < found[-1].regret
+    assert [r.regret for r in found] == sorted(r.regret for r in found)
+
+
 def test_other_solvers_cannot_prove_their_regrets():
     problem = random_problem(4, 6)
     costs = expected(problem)

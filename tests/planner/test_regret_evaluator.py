@@ -70,6 +70,18 @@ def test_a_regret_far_beyond_the_radius_is_exact_all_the_same(geodesics):
         assert search.of(state, stop) == pytest.approx(table.of(state, stop), abs=3e-3)
 
 
+def test_beyond_the_table_regrets_of_less_than_a_metre_are_exact_and_others_capped(geodesics):
+    """The limit is documented, and it is the one on which the displayed regrets depend."""
+    state = Task(geodesics, 12, 2).state
+    truth = {visit: found.regret for visit, found in RegretEvaluator(geodesics).all(state).items()}
+    found = RegretEvaluator(geodesics, solver=SEARCH).all(state)
+    assert {visit for visit, regret in found.items() if regret.capped} == {
+        visit for visit, regret in truth.items() if regret > 1.0
+    }
+    assert any(0.5 < regret < 1.0 for regret in truth.values())
+    assert any(1.0 < regret < 2.0 for regret in truth.values())
+
+
 def test_a_plan_that_is_known_to_be_best_need_not_be_found_again(geodesics):
     class Counting(ExactSolver):
         solved = 0

@@ -136,6 +136,11 @@ def test_holm_of_a_worked_example():
     assert holm(np.array([0.01, 0.04, 0.03, 0.005])) == pytest.approx([0.03, 0.06, 0.06, 0.02])
 
 
+def test_corrected_p_values_are_probabilities():
+    assert holm(np.array([0.6, 0.5, 0.9])).tolist() == [1.0, 1.0, 1.0]
+    assert holm(np.array([0.02, 0.9, 0.7])) == pytest.approx([0.06, 1.0, 1.0])
+
+
 def test_verdicts_need_evidence():
     """No difference is not equivalence: few people are undecided, many equal ones equivalent."""
     rng = np.random.default_rng(2)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from experiments.record.metrics import compute_metrics
+from experiments.record.columns import HEALTH
+from experiments.record.metrics import compute_metrics, measure
 
 DEFAULTS = {"deviated": False, "alternatives": 1, "tied_alternatives": 0, "tied": False}
 
@@ -132,3 +133,53 @@ def test_refusals_replans_and_failures_are_counted_and_what_falls_out_again_is_n
     )
     assert (metrics.refusals, metrics.replans, metrics.failures, metrics.delivered) == (1, 1, 2, 0)
     assert (metrics.planned_distance_m, metrics.reach_bound_m) == (3.0, 1.0)
+
+
+def test_the_columns_of_a_run_name_its_settings_its_person_and_the_model_of_the_participant():
+    start = {
+        "t": 0.0,
+        "event": "start",
+        "objects": 2,
+        "user": "guest",
+        "seed": 3,
+        "format": 1,
+        "order": ["b", "a"],
+    }
+    person = {"reach": 0.9, "eye_height": 1.7, "motion": {"lead": 0.2}}
+    told = {"t": 0.0, "event": "participant", "person": person, "behaviour": {"noise.scale": 0.3}}
+    lost = {"t": 2.0, "event": "grip_lost", "object": "a", "receptacle": None}
+    end = {"t": 4.0, "event": "end", "reason": "interrupted", "signal": "SIGTERM"}
+    arrays = {name: np.array([0.0, 0.1, 0.2]) for name in HEALTH}
+    arrays |= {
+        "position": STRAIGHT,
+        "time": np.array([0.0, 2.0, 4.0]),
+        "settle_s": np.array([np.nan, 0.5, np.nan]),
+    }
+    found = measure([start, told, lost, end], arrays)
+    expected = {
+        **{
+            "objects": 2,
+            "user": "guest",
+            "seed": 3,
+            "simulated": True,
+            "simulated_s": 4.0,
+            "signal": "SIGTERM",
+        },
+        **{
+            "person_reach": 0.9,
+            "person_eye_height": 1.7,
+            "behaviour_noise_scale": 0.3,
+            "ended": "interrupted",
+        },
+        **{
+            "grips_lost": 1,
+            "ejections": 0,
+            "releases_settled": 1,
+            "max_settle_s": 0.5,
+            "max_penetration_m": 0.2,
+        },
+    }
+    assert {name: found[name] for name in expected} == expected
+    assert found["p99_penetration_m"] == pytest.approx(0.198)
+    assert not {"format", "order", "t", "event", "person_motion", "error"} & set(found)
+    assert not [name for name in measure([start, end], arrays) if name.startswith(("person_", "behaviour_"))]

@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 
 from experiments.errors import RecordError
 from experiments.record.columns import decode_action
-from experiments.record.files import read_json, save_arrays
+from experiments.record.files import CHECKSUMS, read_json, save_arrays, write_checksums
 from experiments.record.journal import Header, Journal, read_entries
 from experiments.record.reader import read_journal
 from experiments.record.records import EPISODE, EVENTS, METRICS, EventLog, read_events
 from experiments.record.run_directory import run_directory
+from experiments.record.verify import checksum_mismatches, damage
 from experiments.record.writer import RecordWriter
 from mjsim.values.actions import Move, Pick, Place
 from mjsim.values.episode import Episode, PlacedObject, StartPose
@@ -163,6 +164,33 @@ def test_the_record_of_a_journal_is_that_in_memory(tmp_path, commits):
     record = read_journal(read_entries(path))
     assert contents(record) == contents(memory.record())
     assert (record.reason, record.participant) == ("all delivered", {"input": 6})
+
+
+def test_an_event_that_was_written_wrongly_is_found_with_its_line_and_step():
+    """Its hash is that of what was written, so only the format tells."""
+    writer, sha256 = new_writer(), hashlib.sha256(EPISODE_OF_TWO.to_json().encode()).hexdigest()
+    told = {key: {} for key in ("format", "model", "versions", "world", "inputs")}
+    writer.log.append(0.0, "start", episode_sha256=sha256, objects=2, order=["b", "a"], **told)
+    writer.append(observation(), HealthSample(), 0, Steps(Move()))
+    [found] = damage(writer.record())
+    assert (found.step, found.file) == (0, EVENTS)
+    assert found.message.startswith("line 1: events.jsonl has an invalid event")
+
+
+def test_files_that_are_missing_changed_or_added_after_a_run_are_named(tmp_path):
+    fill(tmp_path)
+    write_checksums(tmp_path, (EPISODE, EVENTS))
+    record = new_writer()
+    record.append(observation(), HealthSample(), 0, Steps(Move()))
+    (tmp_path / "notes.txt").write_text("of a user's own")
+    found = {m.file: m.message for m in checksum_mismatches(tmp_path, record.record())}
+    assert set(found) == {METRICS} and "was not written with the run" in found[METRICS]
+    (tmp_path / EPISODE).write_text("{ }")
+    (tmp_path / EVENTS).unlink()
+    found = {m.file: m.message for m in checksum_mismatches(tmp_path, record.record())}
+    assert "is not the file that was written" in found[EPISODE] and "is missing" in found[EVENTS]
+    (tmp_path / CHECKSUMS).unlink()
+    assert [m.file for m in checksum_mismatches(tmp_path, record.record())] == [CHECKSUMS]
 
 
 def test_a_journal_without_control_steps_is_an_empty_record():

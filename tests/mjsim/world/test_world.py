@@ -12,7 +12,7 @@ from small_worlds import do, finish, scene_of, walk_to, world_of
 
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import compose
-from mjsim.values.actions import IDLE, EventKind, Move, Pick, Place, Refusal
+from mjsim.values.actions import IDLE, EventKind, FollowPath, Move, Pick, Place, Refusal
 from mjsim.values.errors import ActionError, AssetError, PhysicsError
 from mjsim.values.observation import ObjectStatus
 from mjsim.values.options import FIDELITIES, WorldOptions
@@ -240,6 +240,32 @@ def test_an_object_knocked_out_of_its_receptacle_is_loose_again(make):
         (EventKind.DISLODGED, "o0", "crate"),
     ]
     assert world.observation().object_status == (ObjectStatus.LOOSE,)
+
+
+@tiers
+def test_a_path_that_is_followed_while_busy_waits_for_one_step(make, fidelity):
+    walking, idle = (make((1.5, 2.0, 0.0), ("cube", 2.2, 2.0), fidelity=fidelity) for _ in range(2))
+    for world in (walking, idle):
+        world.step(Pick())
+    path = np.array([walking.observation().position, (2.5, 3.0)])
+    for _ in range(3):
+        step = walking.step(FollowPath(path, path[-1], 0.1, shown=True, tolerance=2.0))
+        assert len(step.steps) == 1 and walking.busy
+        idle.step(IDLE)
+        assert walking.state_hash() == idle.state_hash()
+
+
+@tiers
+def test_a_copy_of_the_data_stays_while_the_world_advances(make, fidelity):
+    world = make((1.5, 2.0, 0.0), ("cube", 2.2, 2.0), fidelity=fidelity)
+    copied = world.copy_data()
+    assert copied is not world.data
+    before = world.data.qpos.copy()
+    for _ in range(5):
+        world.step(Move(1.0))
+    assert np.array_equal(copied.qpos, before) and not np.array_equal(world.data.qpos, before)
+    assert world.copy_data(copied) is copied
+    assert np.array_equal(copied.qpos, world.data.qpos) and copied.time == world.data.time
 
 
 def test_mujoco_keeps_no_time_in_a_world_but_by_a_clock_that_somebody_has_set(make):
