@@ -8,6 +8,7 @@ import time
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
+from experiments.visit.plan import DEVICE
 from experiments.visit.procedure import Procedure
 from experiments.visit.recruiter import Candidate, InvalidLink, Preview
 from experiments.visit.server.pages import VisitPages
@@ -51,6 +52,7 @@ class Admission:
             remembers=self._recruiter.platform == "link",
             forgets=self._recruiter.platform == "lab",
             preview=isinstance(came, Preview),
+            device=self._plan.device if DEVICE in self._plan.phases else None,
         )
 
     async def begin(self, request: Request) -> Response:
