@@ -25,6 +25,10 @@ AWAY = 600.0  # longest absence of a returning participant, in seconds of study 
 DELAY = 0.2  # delay of the first inputs on a slow connection, in seconds
 CUTS = 3  # number of times that a bad connection is interrupted during a trial
 TRIES = 20  # maximum number of attempts to connect to a trial or to submit a form
+QUEUE, REFUSED = (
+    "queue",
+    "-refused",
+)  # name of the queue page, and ending of the name of a page with a refused form
 QUEUED = 'http-equiv="refresh"'  # text that identifies the queue page
 QUEUE_PAUSE = 3.0  # time between two requests for the queue page, in seconds
 PAUSE = 0.5  # delay before reconnecting to a trial, in seconds
@@ -103,6 +107,7 @@ class SimulatedPerson:
         while tries < TRIES:
             page = await self._get(self.rehearsed.link)
             if QUEUED in page.text:
+                await self._around.watch(QUEUE, page)
                 await asyncio.sleep(QUEUE_PAUSE)
                 continue
             found = SHOWN.search(page.text)
@@ -162,6 +167,8 @@ class SimulatedPerson:
             answer = await self._post(link, wrong)
             if answer.status_code == httpx.codes.SEE_OTHER and leaves != "fails":
                 self._fault(f"{phase.name} accepts a form that it should refuse")
+            shown = await self._get(link) if answer.status_code == httpx.codes.SEE_OTHER else answer
+            await self._around.watch(f"{phase.name}{REFUSED}", shown)
             return
         if leaves == "refuses":
             form = {"phase": phase.name, "agree": "no"}
