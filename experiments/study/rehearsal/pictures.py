@@ -56,6 +56,7 @@ class Camera:
         for size, (width, height) in SIZES.items():
             screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": size == "phone"}
             await self._ask("Emulation.setDeviceMetricsOverride", **screen)
+            await self._ask("Emulation.setTouchEmulationEnabled", enabled=size == "phone")
             await self._ask("Page.navigate", url=url)
             await self._settle()
             if content:
