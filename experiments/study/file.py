@@ -2,8 +2,7 @@
 
 import hashlib
 import itertools
-import re
-import tomllib
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -17,8 +16,9 @@ from experiments.record.phases import FLYTHROUGH, HUMAN, STORY, TASK, TRAINING
 from experiments.session.familiarise import story_text
 from experiments.trials.design import read_design
 from experiments.trials.exclusions import Exclusions
+from experiments.trials.toml_file import TomlFile
 from experiments.trials.trial_config import SEEDS, TrialConfig
-from experiments.visit.plan import COMPLETION, CONSENT, PHASES, PLAYED, Count, Device, Limits, Seconds
+from experiments.visit.plan import COMPLETION, CONSENT, PHASES, PLAYED, Count, Device, Limits
 from experiments.visit.texts import Texts, read_texts, story_file
 from mjsim.support.files import read_bytes
 from mjsim.support.urls import parse_url
@@ -31,6 +31,7 @@ Code = Annotated[str, msgspec.Meta(pattern="^[0-9A-Za-z_-]{0,64}$")]
 # The origin of a web page, which consists of the scheme, the host and an optional port
 Site = Annotated[str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?$")]
 
+MAX_MINIMUM_S = 86400
 HERE = ("localhost", "127.0.0.1", "::1")  # hosts that may be contacted without TLS
 
 
@@ -88,7 +89,7 @@ class StudySettings(_Table, frozen=True):
     phases: tuple[str, ...] = PHASES
     require_film: bool = False  # if True, participants must play the film to its end
     assignment: Literal["balanced", "uniform"] = "balanced"
-    minimum: dict[str, Seconds] = {}
+    minimum: dict[str, Any] = {}  # minimum duration of phases, in seconds
     optional: tuple[str, ...] = ()
     pay: Pay = Pay()
     device: Device = Device()
@@ -113,7 +114,10 @@ class StudySettings(_Table, frozen=True):
         if ended := [name for name in self.minimum if name in (*PLAYED, COMPLETION)]:
             raise ValueError(f"minimum names {ended[0]!r}, which no time ends; leave it out")
         if played := [name for name in self.optional if name in (CONSENT, TASK, COMPLETION)]:
-            raise ValueError(f"{played[0]} cannot be optional")
+            raise ValueError(f"optional names {played[0]!r}, which cannot be skipped; leave it out")
+        for name, seconds in self.minimum.items():
+            if not (isinstance(seconds, int | float) and 0.0 <= seconds <= MAX_MINIMUM_S):
+                raise ValueError(f"minimum.{name} is {seconds!r}; expected 0 to {MAX_MINIMUM_S} seconds")
 
 
 @dataclass(frozen=True)
@@ -155,28 +159,30 @@ def read_people_study(path: Path) -> Study:
     Raises:
         ConfigError: The file is missing or invalid. The message names the file, the line and the value.
     """
-    design = read_design(path)
-    content = read_bytes(path)
-    table = tomllib.loads(content.decode()).get("study")
+    design, file = read_design(path), TomlFile.read(path, "study")
+    table = file.content.get("study")
     if table is None:
         raise ConfigError(
             f"{path} has no table [study], which a study with people needs; `mjsim study init` writes one"
         )
     try:
-        settings = msgspec.convert({"study": table}, _StudyFile).study
-    except msgspec.ValidationError as error:
-        raise ConfigError(at_line(path, content.decode(), str(error))) from error
-    own_texts = path.parent / settings.texts if settings.texts else None
-    texts = read_texts(settings.language, own_texts, _values(settings))
-    own = design.trials[0].story
-    usual = None if own or STORY not in settings.phases else story_file(settings.language)
+        settings = msgspec.convert(_finite(table), StudySettings)
+        own_texts = path.parent / settings.texts if settings.texts else None
+        texts = read_texts(settings.language, own_texts, _values(settings))
+        own = design.trials[0].story
+        usual = None if own or STORY not in settings.phases else story_file(settings.language)
+    except (msgspec.ValidationError, ConfigError) as error:
+        raise file.fault(error, "study", _StudyFile) from error
     trials = [_of_a_person(trial, settings.phases, usual) for trial in design.trials]
     if any(trial.trial_number > 1 for trial in trials):
         raise ConfigError(
             f"{path}: trials_per_person is for simulated people; a visit of a person has one task"
         )
+    if len(homes := {trial.house for trial in trials}) > 1:
+        told = f"house has {len(homes)} values; a study with people is in one house, so name the same one in all cells"
+        raise file.fault(ConfigError(told), "cells[0]")
     cells = [Cell(tuple(group)) for _, group in itertools.groupby(trials, _without_seeds)]
-    for name in ("house", "story", "training_assistance"):
+    for name in ("story", "training_assistance"):
         if len(values := {getattr(cell.trials[0], name) for cell in cells}) > 1:
             raise ConfigError(
                 f"{path}: cells differ in {name} ({', '.join(map(str, values))}); it is one for all"
@@ -184,7 +190,7 @@ def read_people_study(path: Path) -> Study:
     story = trials[0].story
     return Study(
         path,
-        hashlib.sha256(content).hexdigest(),
+        hashlib.sha256(read_bytes(path)).hexdigest(),
         settings,
         cells,
         texts,
@@ -195,6 +201,16 @@ def read_people_study(path: Path) -> Study:
 
 class _StudyFile(msgspec.Struct):
     study: StudySettings
+
+
+def _finite(table: dict[str, Any], name: str = "") -> dict[str, Any]:
+    """Return a table, or raise `ConfigError` if it contains a number that is infinite or not a number."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            _finite(value, f"{name}{key}.")
+        elif isinstance(value, float) and not math.isfinite(value):
+            raise ConfigError(f"{name}{key} is {value}; expected a finite number")
+    return table
 
 
 def _of_a_person(trial: TrialConfig, phases: Sequence[str], story: Path | None) -> TrialConfig:
@@ -224,33 +240,3 @@ def _values(settings: StudySettings) -> Mapping[str, str]:
         **kept,
         **({"partial": "yes"} if pay.partial else {}),
     }
-
-
-_PATH = re.compile(r"`\$\.?([\w.\[\]-]*)`")
-_HEADER = re.compile(r"\s*\[\[?\s*([\w.\"-]+)\s*\]\]?")
-_KEY = re.compile(r"\s*([\w.\"-]+)\s*=")
-
-
-def at_line(path: Path, text: str, message: str) -> str:
-    """Add the file name and, if possible, the line number to an error message of msgspec."""
-    found = _PATH.search(message)
-    wanted = re.sub(r"\[[^\]]*\]", "", found[1]) if found else ""
-    if unknown := re.search(r"unknown field `([^`]+)`", message):
-        wanted = f"{wanted}.{unknown[1]}".strip(".")
-    line = line_of(text, wanted)
-    return f"{path}, line {line}: {message}" if line else f"{path}: {message}"
-
-
-def line_of(text: str, wanted: str) -> int | None:
-    """Return the line number of a key such as `study.pay.reward`, or of its table if the key is missing."""
-    table, best, depth = "", None, 0
-    for number, line in enumerate(text.splitlines(), 1):
-        if header := _HEADER.match(line):
-            table = name = header[1].replace('"', "")
-        elif key := _KEY.match(line):
-            name = f"{table}.{key[1]}".strip(".").replace('"', "")
-        else:
-            continue
-        if f"{wanted}.".startswith(f"{name}.") and name.count(".") + 1 > depth:
-            best, depth = number, name.count(".") + 1
-    return best

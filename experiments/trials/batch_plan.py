@@ -22,6 +22,7 @@ from experiments.trials.setup import draw_behaviour, draw_person, prepare_sessio
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_reader import TrialReader
 from hud.conditions import CONDITIONS, condition
+from hud.errors import HudError
 from mjsim.generator.home_cache import load_catalogue
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.house_ref import parse_house
@@ -30,8 +31,16 @@ from mjsim.house.scene.scene import compose
 from mjsim.values.episode import POINTS, Episode
 from mjsim.values.errors import EpisodeError, PersonError
 from mjsim.values.person_parameters import PersonParameters
+from planner.errors import PlannerError
 from planner.solvers import solver
 
+# The function that finds the value of a setting, and raises an error if there is none
+NAMES: Mapping[str, Callable[[str], object]] = {
+    "user": participant,
+    "assistance": condition,
+    "training_assistance": condition,
+    "planner": solver,
+}
 MAX_REASONS = 3  # maximum number of reasons that are listed in a note
 Houses = Callable[[str], House]
 
@@ -102,29 +111,36 @@ def _notes(reasons: Counter[str], out: Path) -> Iterable[str]:
 
 
 def check_names(trials: Sequence[TrialConfig]) -> None:
-    """Raise an error if the participant, assistance, planner or behaviour of a trial is unknown."""
-    for check, names in (
-        (participant, {trial.user for trial in trials}),
-        (condition, {name for trial in trials for name in (trial.assistance, trial.training_assistance)}),
-        (solver, {trial.planner for trial in trials}),
-    ):
-        for name in sorted(names):
-            check(name)
+    """Raise `ConfigError` if the participant, assistance, planner or behaviour of a trial is unknown."""
+    for key, check in NAMES.items():
+        for name in sorted({str(getattr(trial, key)) for trial in trials}):
+            try:
+                check(name)
+            except (ConfigError, HudError, PlannerError) as error:
+                raise ConfigError(f"{key}: {error}") from error
     for trial in {(t.user, t.behaviour): t for t in trials}.values():
         draw_behaviour(trial)
 
 
-def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
-    """Check that trials have valid settings and files. Return hashes and versions of their inputs."""
+def check_settings(trials: Sequence[TrialConfig], house: Houses) -> None:
+    """Raise an error if a trial has an unknown name, house or episode, or too many points for its house."""
     check_names(trials)
     catalogue = functools.cache(load_catalogue)
-    house = functools.lru_cache(MAX_HOUSES)(House.load)
+    for name in {trial.house for trial in trials}:
+        catalogue(name)
     for trial in {(t.episode, t.house, t.objects): t for t in trials if t.episode is not None}.values():
         _check_episode(trial, catalogue(trial.house))
     for name, seed, points in dict.fromkeys(
         (t.house, t.house_seed, t.points) for t in trials if _may_be_small(t)
     ):
         house(name).sample_points(seed=seed, points=points)
+
+
+def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
+    """Check that trials have valid settings and files. Return hashes and versions of their inputs."""
+    house = functools.lru_cache(MAX_HOUSES)(House.load)
+    check_settings(trials, house)
+    catalogue = functools.cache(load_catalogue)
     _check_people(trials, house)
     for trial in {(t.house, t.user, t.assistance): t for t in reversed(trials)}.values():
         if _may_not_fit(trial):

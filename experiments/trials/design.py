@@ -3,9 +3,8 @@
 import itertools
 import math
 import re
-import tomllib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,6 +13,7 @@ import msgspec
 
 from experiments.errors import ConfigError
 from experiments.trials.exclusions import Exclusions
+from experiments.trials.toml_file import TomlFile
 from experiments.trials.trial_config import (
     CONFOUNDERS,
     PATHS,
@@ -22,9 +22,11 @@ from experiments.trials.trial_config import (
     TrialConfig,
     episode_settings,
 )
+from hud.errors import HudError
 from mjsim.house.catalogue.generated_names import generated_names, is_generated
 from mjsim.house.catalogue.house_ref import parse_house
-from mjsim.support.files import read_text
+from mjsim.values.errors import MjsimError
+from planner.errors import PlannerError
 
 MAX_NUMBERS = 1_000_000
 
@@ -94,7 +96,7 @@ class _People(msgspec.Struct, forbid_unknown_fields=True):
         another house, so that the order of the houses varies.
         """
         lists: dict[str, list[Any]] = {
-            name: numbers(found) for name in _SEEDS if (found := getattr(self, name)) is not None
+            name: _numbers_of(name, found) for name in _SEEDS if (found := getattr(self, name)) is not None
         }
         if self.houses is not None:
             lists["houses"] = house_names(self.houses)
@@ -133,54 +135,50 @@ class _DesignFile(msgspec.Struct, forbid_unknown_fields=True):
     study: dict[str, Any] = msgspec.field(default_factory=dict)  # parsed by `experiments.study.file`
 
 
-def read_design(path: Path) -> Design:
-    """Read a design from a TOML file. Raises `ConfigError` if the file is not a valid design."""
+def read_design(path: Path, check: Callable[[Sequence[TrialConfig]], object] | None = None) -> Design:
+    """Read a design from a TOML file.
+
+    Args:
+        check: Function that is called with the trials of each cell and raises an error if they are invalid.
+
+    Raises:
+        ConfigError: The file is not a valid design. The message names the line, the key and the value.
+    """
     trials: list[TrialConfig] = []
-    reached = None
-    content = _content(path, "design")
+    file, reached = TomlFile.read(path, "design"), ""
     try:
-        file = msgspec.convert(content, _DesignFile)
-        for reached, cell in enumerate(file.cells):  # noqa: B007 - for error messages
-            trials += _cell_trials({**file.all_cells, **cell}, path.parent)
-        reached = None
-        return Design(tuple(trials), file.exclusions)
-    except (msgspec.ValidationError, ConfigError) as error:
-        raise ConfigError(f"{path}: {_located(str(error), reached)}") from error
+        content = msgspec.convert(file.content, _DesignFile)
+        for number, cell in enumerate(content.cells):
+            reached = f"cells[{number}]"
+            of_cell = _cell_trials({**content.all_cells, **cell}, path.parent)
+            if check is not None:
+                check(of_cell)
+            trials += of_cell
+        reached = ""
+        return Design(tuple(trials), content.exclusions)
+    except (msgspec.ValidationError, ConfigError, HudError, MjsimError, PlannerError) as error:
+        raise file.fault(error, reached, _DesignFile) from error
 
 
 def read_exclusions(path: Path) -> Exclusions:
     """Read exclusions from a TOML file, or from the table `[exclusions]` in a design file."""
-    content = _content(path, "rules")
-    if "cells" in content:
+    file = TomlFile.read(path, "rules")
+    if "cells" in file.content:
         found = read_design(path).exclusions
         if found is None:
             raise ConfigError(f"{path} has no table [exclusions]; add one, or leave out --exclude")
         return found
     try:
-        return msgspec.convert(content, Exclusions)
+        return msgspec.convert(file.content, Exclusions)
     except msgspec.ValidationError as error:
-        raise ConfigError(f"{path}: {error}; docs/analysis.md describes the rules") from error
-
-
-def _content(path: Path, what: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(read_text(path))
-    except OSError as error:
-        raise ConfigError(f"cannot read {what} {path}: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise ConfigError(f"{path} is not TOML: {error}") from error
-
-
-def _located(message: str, cell: int | None) -> str:
-    if cell is None:
-        return message
-    place = f"`$.cells[{cell}]"
-    return message.replace("`$", place) if "`$" in message else f"{message} - at {place}`"
+        raise ConfigError(
+            f"{file.fault(error, kind=Exclusions)}; docs/analysis.md describes the rules"
+        ) from error
 
 
 def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
     if unknown := sorted(set(values) - _IN_A_CELL):
-        raise ConfigError(f"unknown field `{unknown[0]}`; docs/batches.md lists the fields of a design")
+        raise ConfigError(f"unknown field `{unknown[0]}`; there are {', '.join(sorted(_IN_A_CELL))}")
     settings = {name: value for name, value in values.items() if name in SETTINGS}
     people = msgspec.convert({n: v for n, v in values.items() if n not in SETTINGS}, _People).each()
     for seeds in people if "houses" in values else ():
@@ -217,7 +215,7 @@ def numbers(text: int | list[int] | str) -> list[int]:
         text = [text]
     if isinstance(text, list):
         if not text or min(text) < 0:
-            raise ConfigError(f"{text} must have at least one number, and none below 0")
+            raise ConfigError(f"{text} has no number, or one below 0; name numbers from 0")
         return text
     values: list[int] = []
     for part in text.split(","):
@@ -232,6 +230,13 @@ def numbers(text: int | list[int] | str) -> list[int]:
     if not values:
         raise ConfigError(f"{text!r} has no numbers; a range excludes its end")
     return values
+
+
+def _numbers_of(name: str, text: int | list[int] | str) -> list[int]:
+    try:
+        return numbers(text)
+    except ConfigError as error:
+        raise ConfigError(f"{name}: {error}") from error
 
 
 def counted(number: int, noun: str) -> str:

@@ -3,14 +3,15 @@
 import difflib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
 
 from experiments.errors import RecordError
-from experiments.record.phases import ALL_DELIVERED
+from experiments.record.metrics import Displays
+from experiments.record.phases import ALL_DELIVERED, is_simulated
 
 Row = Mapping[str, Any]
 Comparison = Literal["<", "<=", ">", ">=", "==", "!=", "missing", "infinite"]
@@ -18,6 +19,7 @@ Reason = Annotated[str, msgspec.Meta(min_length=1, max_length=200, pattern=r"^[^
 Name = Annotated[str, msgspec.Meta(max_length=200)]
 # Columns that identify a participant, in order of reliability
 IDS = ("participant", "fingerprint", "person_seed")
+FROM_PEOPLE = {*(field.name for field in fields(Displays)), "inattentive"}  # columns that simulations lack
 BY_NAME = "people by name"
 
 
@@ -110,8 +112,9 @@ def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[in
     Every rule must name a column of the table, and every excluded ID must occur in the table.
     """
     found: dict[int, dict[str, str]] = {}
+    skipped = inapplicable(exclusions, rows)
     for number, rule in enumerate(exclusions.all_rules(), start=1):
-        if rule is UNFINISHED and not any(rule.column in row for row in rows):
+        if rule in skipped or (rule is UNFINISHED and not any(rule.column in row for row in rows)):
             continue
         label = f"rule {number} ({rule})"
         _check_column(rule.column, rows, f"{path}: {label}")
@@ -138,6 +141,16 @@ def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[in
         k: LeftOut(person_name(rows[k], k), rows[k]["assistance"], rows[k]["objects"], found[k])
         for k in sorted(found)
     }
+
+
+def inapplicable(exclusions: Exclusions, rows: Sequence[Row]) -> tuple[Rule, ...]:
+    """Return the rules about measures that are only recorded from people, if all rows are simulated."""
+    simulated = all(is_simulated(row.get("user")) for row in rows)
+    return tuple(
+        rule
+        for rule in exclusions.rules
+        if simulated and rule.column in FROM_PEOPLE and not any(rule.column in row for row in rows)
+    )
 
 
 def person_name(row: Row, number: int) -> str:

@@ -59,7 +59,8 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     time_limit: Annotated[
         float | None,
         _about(
-            "Simulated time after which the trial ends, in seconds (default: 60, plus 150 per object).", metavar="S"
+            "Simulated time after which the trial ends, in seconds (default: 60, plus 150 per object).",
+            metavar="S",
         ),
     ] = None
     live: Annotated[
@@ -106,7 +107,11 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         ),
     ] = 1
     capacity: Annotated[
-        int, _about("Largest number of objects carried at a time; with 1, only the right hand is used.", choices=CAPACITIES)
+        int,
+        _about(
+            "Largest number of objects carried at a time; with 1, only the right hand is used.",
+            choices=CAPACITIES,
+        ),
     ] = CAPACITY
     episode: Annotated[
         str | None,
@@ -149,8 +154,8 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     field_of_view_range: Annotated[
         str | None,
         _about(
-            "Range in radians in which a person may choose the horizontal field of view if the browser draws; without it, "
-            "the field of view is the person's parameter (docs/browser.md).",
+            "Range in radians in which a person may choose the horizontal field of view if the browser draws; without "
+            "it, the field of view is the person's parameter (docs/browser.md).",
             metavar="LOW,HIGH",
         ),
     ] = None
@@ -212,7 +217,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         if self.capacity not in CAPACITIES:
             raise ConfigError(f"capacity is {self.capacity}; a person with two hands carries 1 or 2 objects")
         if self.time_limit is not None and not 0 < self.time_limit < math.inf:
-            raise ConfigError(f"time limit must be positive, got {self.time_limit} s")
+            raise ConfigError(f"time_limit is {self.time_limit} s; it must be positive and finite")
         if self.story is not None and STORY not in self.phase_names:
             raise ConfigError(f"story is {self.story}, but the phases lack story; add it")
         if self.training_assistance != NO_ASSISTANCE and TRAINING not in self.phase_names:
@@ -280,5 +285,4 @@ def _check_seed(name: str, seed: int | None) -> None:
     if seed is None:
         raise ConfigError(f"a trial needs a seed, or each of {', '.join(SEEDS)}")
     if not 0 <= seed <= MAX_SEED:
-        fault = "not be negative" if seed < 0 else f"be at most {MAX_SEED}"
-        raise ConfigError(f"{name} must {fault}, got {seed}")
+        raise ConfigError(f"{name} is {seed}; it must be 0 to {MAX_SEED}")

@@ -42,10 +42,17 @@ def add_parser(commands: Any) -> None:
         "folders", type=Path, nargs="+", metavar="DIR", help="folder of a pool; results go to the first"
     )
     parser.add_argument(
-        "--study", default="paper", metavar="STUDY.toml", help="study whose population is fitted (default: %(default)s)"
+        "--study",
+        default="paper",
+        metavar="STUDY.toml",
+        help="study whose population is fitted (default: %(default)s)",
     )
     parser.add_argument(
-        "--draws", type=int, default=10_000, metavar="N", help="number of populations to draw (default: %(default)s)"
+        "--draws",
+        type=int,
+        default=10_000,
+        metavar="N",
+        help="number of populations to draw (default: %(default)s)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the random draws")
     parser.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: DIR/calibration)")

@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
         RecordError: The folder does not contain a study, or output files already exist.
     """
     require_extra("study")
-    from experiments.analysis.study.measures import read_measures
+    from experiments.analysis.study.measures import read_measures, with_survey
     from experiments.analysis.study.table import ANALYSIS, read_study
     from experiments.errors import ConfigError
     from experiments.record.run_directory import check_file
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     for name in FILES:
         check_file(out / name, replace=arguments.force)
     published = read_published()
-    people = read_study(arguments.folder, read_measures())
+    people = read_study(arguments.folder, with_survey(read_measures(), arguments.folder))
     found = score(people, published, seed=arguments.seed)
     _show(found)
     for line in people.absent():

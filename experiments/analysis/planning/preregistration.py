@@ -17,12 +17,18 @@ from typing import Any
 
 import msgspec
 
-from experiments.analysis.study.measures import FILE, Measures, decoded_measures, read_measures
+from experiments.analysis.study.measures import (
+    FILE,
+    SURVEY,
+    Measures,
+    Survey,
+    decoded_measures,
+    read_measures,
+)
 from experiments.errors import ConfigError, RecordError
 from experiments.record import records
 from experiments.record.archive import read_file, run_paths
 from experiments.record.run_directory import TRIALS
-from experiments.trials.batch_plan import check_names
 from experiments.trials.design import counted, read_design
 from experiments.trials.exclusions import Exclusions
 from experiments.trials.trial_config import PATHS, SETTINGS
@@ -56,15 +62,19 @@ class Preregistration:
     design: Sequence[Mapping[str, Any]]
 
 
-def write_preregistration(study: Path, out: Path, measures: Path = FILE) -> str:
-    """Preregister a study by writing its files to a ZIP file. Return the SHA-256 of that file."""
+def write_preregistration(study: Path, out: Path, measures: Path = FILE, survey: Survey | None = None) -> str:
+    """Preregister a study by writing its files to a ZIP file. Return the SHA-256 of that file.
+
+    The file contains the survey only if it has other items or another scale than the measures.
+    """
     design = read_design(study)
-    check_names(design.trials)
-    read_measures(measures)
+    known = read_measures(measures)
     if out.exists() and out.samefile(study):
         raise ConfigError(f"{out} is the study file; name another file to write")
     files = _frozen(design.exclusions or Exclusions(), measures.read_bytes())
     files[STUDY] = study.read_bytes()
+    if survey is not None and known.of(survey) != known:
+        files[SURVEY] = _json(msgspec.to_builtins(survey))
     files[DESIGN] = _json([_comparable(trial.settings()) for trial in design.trials])
     files[MANIFEST] = _json(
         {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())}
@@ -119,6 +129,8 @@ def read_preregistration(path: Path) -> Preregistration:
             raise ConfigError(f"it was changed: {changed[0]} differs from the manifest")
         exclusions = msgspec.json.decode(files[EXCLUSIONS], type=Exclusions)
         measures = decoded_measures(files[MEASURES])
+        if SURVEY in files:
+            measures = measures.of(msgspec.json.decode(files[SURVEY], type=Survey))
         versions = msgspec.json.decode(files[VERSIONS], type=dict[str, str])
         design = msgspec.json.decode(files[DESIGN], type=list[dict[str, Any]])
         for trial in design:

@@ -13,6 +13,7 @@ import shapely
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -20,7 +21,7 @@ from experiments.analysis.comparison import mean_interval
 from experiments.analysis.comparison_plot import mark_origin
 from experiments.analysis.page import FigureBlock
 from experiments.analysis.study.analysis import Analysis
-from experiments.analysis.study.measures import ANSWERS, LIKERT_PREFIX
+from experiments.analysis.study.measures import LIKERT_PREFIX
 from experiments.analysis.study.table import StudyTable
 from experiments.errors import RecordError
 from experiments.house import House
@@ -115,20 +116,23 @@ def answers(analysis: Analysis) -> FigureBlock:
     """Draw stacked bars of the answers to each survey item, with one bar per condition."""
     table = analysis.table
     items = [name for name in table.columns if name.startswith(LIKERT_PREFIX)]
+    points = analysis.measures.points
+    colours = LinearSegmentedColormap.from_list("answers", ANSWER_COLOURS, points)
     figure = Figure(figsize=(7.0, 0.9 * len(items) + 0.6), layout="constrained")
     for axes, item in zip(grid(figure, len(items), 1)[:, 0], items, strict=True):
         groups = table.groups(item)
         for place, values in enumerate(groups.values()):
             left = 0.0
-            for answer, colour in zip(range(ANSWERS[0], ANSWERS[1] + 1), ANSWER_COLOURS, strict=True):
+            for answer in range(1, points + 1):
                 share = float((values == answer).mean())
-                axes.barh(-place, share, left=left, color=colour, height=0.8)
+                axes.barh(-place, share, left=left, color=colours(answer - 1), height=0.8)
                 left += share
         axes.set_yticks([-k for k in range(len(groups))], list(groups))
         axes.set_title(analysis.measures.likert[item.removeprefix(LIKERT_PREFIX)], fontsize=9, loc="left")
         axes.set_xlim(0, 1)
     figure.supxlabel("share of people", fontsize=9)
-    caption = "Shares of the answers from 1 (brown, disagree) to 5 (violet, agree), all numbers of objects together."
+    shares = f"Shares of the answers from 1 (brown, disagree) to {points} (violet, agree)"
+    caption = f"{shares}, all numbers of objects together."
     return framed(figure, "Answers by condition", table, caption)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import ConfigError, RecordError, shown
+from experiments.record.files import read_json
 from experiments.record.metrics import CIRCUMSTANCES, Displays, Metrics
 from experiments.trials.designs import FOLDER
 from experiments.trials.trial_config import SETTINGS
@@ -25,7 +26,7 @@ _OF_A_TRIAL = re.compile(
     "tunnellings|grips_lost"
 )
 LIKERT_PREFIX = "likert_"  # prefix of columns with survey answers
-ANSWERS = (1, 5)  # smallest and largest answer to a Likert item
+SURVEY = "survey.json"  # file with the scale and the items of the survey
 
 
 class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -61,16 +62,28 @@ class Equivalence(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     eta_squared: float
 
 
+class Survey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The rating scale of a study's survey: the number of points, and the text of each item by name."""
+
+    points: int
+    items: dict[str, str]
+
+
 class Measures(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The measures of an analysis and the labels of survey items, both by short name."""
 
     objective: dict[str, Measure] = msgspec.field(name="measures")
     likert: dict[str, str]
     equivalence: Equivalence
+    points: int = 5  # number of points of the survey's scale
 
     def answers(self) -> dict[str, str]:
         """Return the label of each survey item by the name of its table column."""
         return {LIKERT_PREFIX + name: label for name, label in self.likert.items()}
+
+    def of(self, survey: Survey) -> "Measures":
+        """Return these measures with the scale and with all items of a study's survey."""
+        return msgspec.structs.replace(self, likert=survey.items | self.likert, points=survey.points)
 
 
 def read_measures(path: Path = FILE) -> Measures:
@@ -81,6 +94,12 @@ def read_measures(path: Path = FILE) -> Measures:
         raise ConfigError(f"cannot read measures {path}: {error.strerror}") from error
     except ValueError as error:
         raise ConfigError(f"{path}: {error}; {FILE} is an example of such a file") from error
+
+
+def with_survey(measures: Measures, folder: Path) -> Measures:
+    """Add the survey that `mjsim study collect` has written next to a table, if there is one."""
+    path = folder / SURVEY
+    return measures.of(msgspec.convert(read_json(path), Survey)) if path.is_file() else measures
 
 
 def decoded_measures(content: bytes) -> Measures:
@@ -141,8 +160,10 @@ def check_ranges(
                 )
 
 
-def check_answers(values: NDArray[np.float64], name: str, path: Path) -> None:
+def check_answers(values: NDArray[np.float64], name: str, points: int, path: Path) -> None:
     given = values[~np.isnan(values)]
-    bad = given[(given != np.round(given)) | (given < ANSWERS[0]) | (given > ANSWERS[1])]
+    bad = given[(given != np.round(given)) | (given < 1) | (given > points)]
     if len(bad):
-        raise RecordError(f"{path}: {name} has the answer {bad[0]:g}; answers are whole numbers from 1 to 5")
+        raise RecordError(
+            f"{path}: {name} has the answer {bad[0]:g}; answers are whole numbers from 1 to {points}"
+        )

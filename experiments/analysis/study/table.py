@@ -25,7 +25,7 @@ from experiments.record.phases import ALL_DELIVERED, RECORDED, REHEARSED, TASK, 
 from experiments.record.run_directory import VISIT, is_run, visit_folders
 from experiments.trials.batch_folder import read_trial
 from experiments.trials.design import confounded_rows, counted
-from experiments.trials.exclusions import Exclusions, LeftOut, left_out, person_name
+from experiments.trials.exclusions import Exclusions, LeftOut, inapplicable, left_out, person_name
 from experiments.trials.table import NAME, read_rows
 from experiments.trials.trial_config import SEEDS
 
@@ -202,7 +202,7 @@ def study_table(
         )
     check_ranges(kept, numbers, measures, path)
     for name in answers:
-        check_answers(columns[name], name, path)
+        check_answers(columns[name], name, measures.points, path)
     return StudyTable(
         rows,
         np.array([str(row["assistance"]) for row in rows]),
@@ -212,7 +212,7 @@ def study_table(
         columns,
         sources,
         origin,
-        tuple(_notes(rows, measures)),
+        (*_notes(rows, measures), *_inapplicable(exclusions, people)),
         tuple(absent.values()),
         tuple(_gaps(kept, read, sources)),
     )
@@ -271,6 +271,11 @@ def _notes(rows: Sequence[Mapping[str, Any]], measures: Measures) -> list[str]:
     if confounded := confounded_rows(rows):
         notes.append(confounded[0].upper() + confounded[1:] + ".")
     return notes
+
+
+def _inapplicable(exclusions: Exclusions, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    for rule in inapplicable(exclusions, rows):
+        yield f"The rule {rule} is not applied, because {rule.column} is only recorded from people."
 
 
 def _person(row: Mapping[str, Any], number: int) -> str:

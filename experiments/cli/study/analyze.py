@@ -53,14 +53,11 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     require_extra("study")
-    from experiments.analysis.planning.preregistration import departures, read_preregistration
-    from experiments.analysis.report.report import report
-    from experiments.analysis.study.analysis import analyse
-    from experiments.analysis.study.files import check_files, write_analysis
-    from experiments.analysis.study.measures import read_measures
-    from experiments.analysis.study.robustness import Selection, leave_one_out
-    from experiments.analysis.study.table import ANALYSIS, REPORT, people_path, read_people, study_table
-    from experiments.study.data.copies import note_derived
+    from experiments.analysis.planning.preregistration import read_preregistration
+    from experiments.analysis.study.files import check_files
+    from experiments.analysis.study.measures import read_measures, with_survey
+    from experiments.analysis.study.table import ANALYSIS, REPORT
+    from experiments.study.data.analyses import write_report
     from experiments.trials.design import read_exclusions
     from experiments.trials.exclusions import Exclusions
 
@@ -73,15 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
     measures = read_measures() if frozen is None else frozen.measures
     if arguments.measures is not None:
         measures = read_measures(arguments.measures)
-    path, people = people_path(arguments.folder), read_people(arguments.folder)
-    analysis = analyse(study_table(people, measures, path, exclusions), measures)
-    without = leave_one_out(people, measures, path, exclusions)
-    selection = Selection(without)
-    if frozen is not None:
-        departing = departures(frozen, exclusions, people, arguments.folder, measures)
-        selection = Selection(without, frozen.sha256, departing)
-    note_derived(arguments.folder, "analysis", out)
-    write_analysis(out, analysis, report(analysis, arguments.folder, selection), selection.as_json())
+    measures = with_survey(measures, arguments.folder)
+    analysis, selection = write_report(arguments.folder, out, exclusions, measures, frozen)
     print(
         f"{analysis.table.origin}: {len(analysis.table.rows)} people, {len(analysis.table.left_out)} left out. "
         f"{out / REPORT}"

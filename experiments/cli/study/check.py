@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from experiments.cli.doctor import require_extra
 from experiments.cli.options import add_command
 from experiments.cli.server import prepare_process
-from experiments.cli.study.database import add_study_file, people_study
+from experiments.cli.study.database import add_study_file, checked_study
 from experiments.errors import ConfigError
 from experiments.session.signals import run_until_signal
 
@@ -45,7 +45,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    study = people_study(arguments)
+    study = checked_study(arguments)
     require_extra("study")
     from experiments.cli.terminal import error_console, progress_bars
     from experiments.study.plan import plan_of
@@ -111,7 +111,7 @@ async def _walk(
     from experiments.study.rehearsal.dry_run import dry_run
     from experiments.study.rehearsal.pictures import BROWSERS, browser, camera, write_contact_sheet
 
-    async def note(name: str, _url: str) -> None:
+    async def note(name: str, _url: str, _content: str) -> None:
         on_page(name)
 
     if out is None:
@@ -121,9 +121,9 @@ async def _walk(
         return await dry_run(study, recruiter, folder, pool, note)
     async with camera(program, out) as taking:
 
-        async def photograph(name: str, url: str) -> None:
+        async def photograph(name: str, url: str, content: str) -> None:
             on_page(name)
-            await taking.photograph(name, url)
+            await taking.photograph(name, url, content)
 
         walked = await dry_run(study, recruiter, folder, pool, photograph)
     print(f"pictures  {write_contact_sheet(out, taking.taken, study.settings.title)}")

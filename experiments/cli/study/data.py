@@ -101,12 +101,13 @@ def _add(commands: Any, name: str, run: Any, summary: str, description: str) -> 
 
 def run_collect(arguments: argparse.Namespace) -> int:
     require_extra("people")
+    from experiments.analysis.study.measures import SURVEY
     from experiments.record.run_directory import check_file
     from experiments.study.data.collect import TEXTS, collect, collect_visits, write_collected
     from experiments.study.data.copies import note_copy, note_derived
     from experiments.trials.table import NAME
 
-    for name in (f"{NAME}.parquet", f"{NAME}.csv", TEXTS):
+    for name in (f"{NAME}.parquet", f"{NAME}.csv", TEXTS, SURVEY):
         check_file(arguments.out / name, replace=arguments.force)
     is_study = _is_study_folder(arguments)
     if is_study:

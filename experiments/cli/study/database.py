@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from experiments.cli.doctor import require_extra
 from experiments.errors import ConfigError, RecordError
 from experiments.session.signals import run_until_signal
+from experiments.trials.designs import study_path
 
 if TYPE_CHECKING:
     from experiments.study.file import Study
@@ -33,31 +34,60 @@ def add_served_study(parser: argparse.ArgumentParser) -> None:
 def people_study(arguments: argparse.Namespace) -> "Study":
     require_extra("people")
     from experiments.study.file import read_people_study
-    from experiments.trials.designs import study_path
 
     return read_people_study(study_path(arguments.study))
+
+
+def checked_study(arguments: argparse.Namespace, *, recruits: bool = False) -> "Study":
+    """Read a study file that something is to be started with. Unlike `people_study`, check all names in it.
+
+    `recruits` requires the settings of the recruitment platform as well.
+    """
+    require_extra("people")
+    from experiments.study.validation import check_study
+
+    return check_study(study_path(arguments.study), recruits=recruits) or people_study(arguments)
 
 
 def with_store(
     study: "Study",
     arguments: argparse.Namespace,
     work: "Callable[[Store], Awaitable[T]]",
-    url: str | None = None,
+    *,
+    create: bool = False,
 ) -> T:
     """Open the database of a study, call `work` with it, and return the result.
 
-    The database is closed even if a signal interrupts the work.
+    The database is closed even if a signal interrupts the work. `create` adds the study if there is none.
     """
-    from experiments.visit.store import Store
 
     async def opened() -> T:
-        store = await Store.open(url or database_url(arguments), study.settings.name, study.sha256)
+        store = await open_store(study, arguments, arguments.folder, create=create)
         try:
             return await work(store)
         finally:
             await store.close()
 
     return run_until_signal(opened())
+
+
+async def open_store(
+    study: "Study", arguments: argparse.Namespace, folder: Path, *, create: bool = False
+) -> "Store":
+    """Open the database of a study, which is in `folder` unless the arguments name another one.
+
+    Raises:
+        RecordError: The folder has no database, and `create` is false.
+        StoreError: The database is of another program, another study or a newer version.
+    """
+    from experiments.visit.store import Store
+
+    path, settings = folder / DATABASE, study.settings
+    if url := getattr(arguments, "database", None):
+        return await Store.open(str(url), settings.name, study.sha256, create=create)
+    if not create and not path.is_file():
+        raise RecordError(f"{folder} has no {DATABASE}; name the folder of `mjsim study serve`")
+    return await Store.open(sqlite_url(path), settings.name, study.sha256, create=create, alone=True)
 
 
 def add_database(parser: argparse.ArgumentParser) -> None:
@@ -68,15 +98,6 @@ def add_database(parser: argparse.ArgumentParser) -> None:
         help="database of the study, such as postgresql://USER:PASSWORD@HOST/NAME or mysql://... (default: the value "
         f"of {URL}, which lists of processes do not show, else {DATABASE} in the study's folder)",
     )
-
-
-def database_url(arguments: argparse.Namespace) -> str:
-    if arguments.database:
-        return str(arguments.database)
-    path: Path = arguments.folder / DATABASE
-    if not path.is_file():
-        raise RecordError(f"{arguments.folder} has no {DATABASE}; name the folder of `mjsim study serve`")
-    return sqlite_url(path)
 
 
 def sqlite_url(path: Path) -> str:

@@ -60,9 +60,14 @@ def run_preregister(arguments: argparse.Namespace) -> int:
     from experiments.analysis.planning.preregistration import write_preregistration
     from experiments.analysis.study.measures import FILE
     from experiments.record.run_directory import check_file
+    from experiments.study.data.collect import survey_of
+    from experiments.study.validation import check_study
     from experiments.trials.designs import study_path
 
     check_file(arguments.out, replace=arguments.force)
+    study = check_study(study_path(arguments.study))
+    survey = None if study is None else survey_of(study)
     measures = FILE if arguments.measures is None else arguments.measures
-    print(f"{write_preregistration(study_path(arguments.study), arguments.out, measures)}  {arguments.out}")
+    sha256 = write_preregistration(study_path(arguments.study), arguments.out, measures, survey)
+    print(f"{sha256}  {arguments.out}")
     return 0

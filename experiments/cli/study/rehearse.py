@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 from experiments.cli.doctor import require_extra
 from experiments.cli.options import add_command
 from experiments.cli.server import number
-from experiments.cli.study.database import DATABASE, add_study_file, people_study, sqlite_url
-from experiments.errors import ConfigError
+from experiments.cli.study.database import add_study_file, checked_study, open_store
 from experiments.session.signals import run_until_signal
 
 if TYPE_CHECKING:
@@ -68,7 +67,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    study = people_study(arguments)
+    study = checked_study(arguments, recruits=True)
     require_extra("study")
     from experiments.session.video import check_film
     from experiments.study.rehearsal.report import REPORT
@@ -89,7 +88,6 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"{count:6d} {what}")
     print(f"finished by cell: {', '.join(str(count) for count in found.cells.values())}")
     print(f"{found.owed / 100:.2f} {study.settings.pay.currency} would be owed")
-    _analyse(study, arguments.out)
     print(f"{'passed' if found.passed else 'NOT PASSED'}: {arguments.out / REPORT}")
     return 0 if found.passed else 1
 
@@ -100,7 +98,6 @@ async def _run(
     from experiments.cli.terminal import counting_bars
     from experiments.study.rehearsal.report import report
     from experiments.study.rehearsal.run import SERVED, rehearse
-    from experiments.visit.store import Store
 
     outcomes: Counter[str] = Counter()
     with counting_bars("people", "{task.fields[outcomes]}") as bars:
@@ -112,26 +109,11 @@ async def _run(
             bars.update(bar, completed=outcomes.total(), outcomes=text)
 
         people = await rehearse(study, settings, arguments.out, arguments.film, show)
-    url = sqlite_url(arguments.out / SERVED / DATABASE)
-    store = await Store.open(url, study.settings.name, study.sha256)
+    store = await open_store(study, arguments, arguments.out / SERVED)
     try:
         return await report(study, settings, store, people, arguments.out)
     finally:
         await store.close()
-
-
-def _analyse(study: "Study", out: Path) -> None:
-    """Analyse the rehearsal like a real study. If there are too few participants, only print a message."""
-    from experiments.cli.study import analyze
-    from experiments.errors import RecordError
-    from experiments.study.rehearsal.report import TABLE
-
-    exclude = None if study.exclusions is None else study.path
-    given = {"exclude": exclude, "preregistration": None, "measures": None, "force": True}
-    try:
-        analyze.run(argparse.Namespace(folder=out / TABLE, out=out / "analysis", **given))
-    except (ConfigError, RecordError) as error:
-        print(f"no analysis: {error}")
 
 
 def _positive(text: str) -> float:

@@ -7,14 +7,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import add_command
-from experiments.cli.study.database import (
-    DATABASE,
-    add_database,
-    add_served_study,
-    people_study,
-    sqlite_url,
-    with_store,
-)
+from experiments.cli.study.database import add_database, add_served_study, people_study, with_store
 from experiments.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -50,13 +43,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"`{arguments.what}` needs the NAME of an account")
     if arguments.what == "add" and not arguments.role:
         raise ConfigError(f"`add` needs --role: {', '.join(ROLES)}")
-    study, url = people_study(arguments), None
-    if (
-        arguments.what == "add" and not arguments.database
-    ):  # accounts may be created before the server first starts
+    study, adds = people_study(arguments), arguments.what == "add"
+    if adds:  # accounts may be created before the server first starts
         arguments.folder.mkdir(parents=True, exist_ok=True)
-        url = sqlite_url(arguments.folder / DATABASE)
-    with_store(study, arguments, lambda store: _do(store, arguments), url)
+    with_store(study, arguments, lambda store: _do(store, arguments), create=adds)
     return 0
 
 

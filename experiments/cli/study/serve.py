@@ -22,12 +22,12 @@ from experiments.cli.server import (
     serve,
 )
 from experiments.cli.study.database import (
-    DATABASE,
     add_database,
     add_served_study,
     add_study_file,
+    checked_study,
+    open_store,
     people_study,
-    sqlite_url,
     with_store,
 )
 from experiments.record.phases import FLYTHROUGH
@@ -107,11 +107,9 @@ def _add_hosts(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    study = people_study(arguments)
+    study = checked_study(arguments, recruits=True)
     from experiments.session.video import check_film
     from experiments.study.data.copies import INDEX
-    from experiments.study.plan import plan_of
-    from experiments.visit.phases import phases_of
 
     if arguments.rehearsal is not None:
         from experiments.study.rehearsal.plan import rehearsed
@@ -119,7 +117,6 @@ def run(arguments: argparse.Namespace) -> int:
         study = rehearsed(study, arguments.rehearsal)
     if arguments.film is not None:
         check_film(arguments.film)
-    phases_of(plan_of(study))  # raises an error early if a custom phase or a completion code is missing
     check_public_url(arguments.public_url)
     check_public_url(arguments.researcher_url)
     prepare_process()  # must come first so that the folder is created with private permissions
@@ -158,10 +155,8 @@ async def _serve(
     from experiments.visit.folders import VISITS, VisitFolders
     from experiments.visit.procedure import Procedure
     from experiments.visit.server.app import ServerOptions, VisitServer
-    from experiments.visit.store import Store
 
-    url = arguments.database or sqlite_url(arguments.out / DATABASE)
-    store = await Store.open(url, study.settings.name, study.sha256)
+    store = await open_store(study, arguments, arguments.out, create=True)
     check_people(study, await store.people())
     folders = VisitFolders(arguments.out.absolute() / VISITS)
     procedure = Procedure(plan_of(study, film), store, folders, np.random.default_rng())

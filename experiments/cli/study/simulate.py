@@ -39,8 +39,10 @@ def add_study(parser: argparse.ArgumentParser, **settings: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from experiments.cli.terminal import error_console
+    from experiments.study.validation import check_study
     from experiments.trials.designs import read_study, study_path
 
+    check_study(study_path(arguments.study))
     design = read_study(study_path(arguments.study), arguments.people)
     if (code := run_share(design, arguments, "simulated people")) is not None:
         return code

@@ -11,8 +11,12 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, TypeVar
 
-from experiments.analysis.study.measures import LIKERT_PREFIX
+import msgspec
+
+from experiments.analysis.study.measures import LIKERT_PREFIX, Survey
+from experiments.analysis.study.measures import SURVEY as SURVEY_FILE
 from experiments.errors import ConfigError, RecordError, ReplayError
+from experiments.record.files import write_json
 from experiments.record.phases import REHEARSAL, TASK
 from experiments.record.run_directory import is_run, visit_folders
 from experiments.study.data.copies import INDEX
@@ -42,12 +46,14 @@ class Collected:
         texts: Free-text answers. Each row contains the participant, the item and the text.
         unfinished: Number of participants who did not play the task to its end, by status.
         unusable: Error message for each participant whose run cannot be read.
+        survey: Items on a scale, or None for `mjsim play`.
     """
 
     rows: Sequence[Mapping[str, Any]]
     texts: Sequence[tuple[str, str, str]]
     unfinished: Mapping[str, int]
     unusable: Mapping[str, str]
+    survey: Survey | None = None
 
 
 async def collect(study: Study, store: Store, folder: Path) -> Collected:
@@ -77,7 +83,15 @@ async def collect(study: Study, store: Store, folder: Path) -> Collected:
         about = _about(person, trial, phases_of.get(person.id, ()))
         row = {**about, **run.row, **_answers(items, answers_of.get(person.id, ()))}
         rows.append({key: harmless(value) if isinstance(value, str) else value for key, value in row.items()})
-    return Collected(_complete(rows), _texts(items, people, answers), unfinished, unusable)
+    return Collected(_complete(rows), _texts(items, people, answers), unfinished, unusable, survey_of(study))
+
+
+def survey_of(study: Study) -> Survey:
+    """Return the scale of a study's survey, and the items that are answered on it."""
+    section = study.texts[SURVEY]
+    return Survey(
+        len(section.scale), {item.name: item.text for item in section.items if item.kind == "scale"}
+    )
 
 
 def _by_person(rows: Sequence[Row]) -> Mapping[int, Sequence[Row]]:
@@ -114,9 +128,11 @@ def collect_visits(folder: Path) -> Collected:
 
 
 def write_collected(collected: Collected, out: Path) -> Sequence[Path]:
-    """Write `trials.parquet`, `trials.csv` and `texts.csv` into a folder, and return their paths."""
+    """Write the tables and the survey into a folder, and return the paths of the tables."""
     out.mkdir(0o700, parents=True, exist_ok=True)
     (out / INDEX).touch(0o600)
+    if collected.survey is not None:
+        write_json(out / SURVEY_FILE, msgspec.to_builtins(collected.survey))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("participant", "item", "text"))

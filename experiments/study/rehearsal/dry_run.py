@@ -1,43 +1,53 @@
 """Run a short rehearsal with one simulated participant for each way in which a visit can end."""
 
 import asyncio
+import datetime
 import socket
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import AbstractContextManager, asynccontextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
+from urllib.parse import urlencode
 
 import httpx
 import msgspec
 import numpy as np
 import uvicorn
 
+from experiments.analysis.study.table import ANALYSIS
 from experiments.house import House
-from experiments.study.data.collect import collect
+from experiments.record.phases import TASK
+from experiments.study.data.analyses import analysis_faults
+from experiments.study.data.collect import collect, write_collected
 from experiments.study.file import Cell, Study
 from experiments.study.plan import plan_of
-from experiments.study.rehearsal.person import Rehearsed, SimulatedPerson, Surroundings
+from experiments.study.rehearsal.person import QUEUE, REFUSED, Rehearsed, SimulatedPerson, Surroundings
+from experiments.study.rehearsal.pictures import HELP
 from experiments.study.rehearsal.plan import Leaving, Planned, link_parameters, rehearsed
-from experiments.study.rehearsal.report import STATUS
+from experiments.study.rehearsal.report import STATUS, TABLE
 from experiments.visit.folders import VISITS, VisitFolders
 from experiments.visit.phases.base import FormPhase
 from experiments.visit.plan import COMPREHENSION, CONSENT, DEVICE
 from experiments.visit.procedure import Procedure
 from experiments.visit.recruiter import Recruiter
 from experiments.visit.server.app import ServerOptions, VisitServer
-from experiments.visit.store import Store
+from experiments.visit.store import Store, StudyState, utc_now
 from experiments.visit.tokens import token_hash
+from experiments.web.server.limit import SessionLimit
 from experiments.web.server.pool import WorkerPool
 
 MINIMUM_S = 1.0  # longest minimum duration of a phase in a dry run, in seconds
 TASK_S = 1.0
 PLACES = 10  # factor by which the trials of a cell are repeated so that no participant is turned away
 FACTOR = 1e6  # factor by which reading times are divided
+LATE = 999  # number of a participant who times out
 TIMEOUT_S = 400.0  # HTTP timeout in seconds, long enough for the compilation during the first request
 
-Photograph = Callable[[str, str], Awaitable[None]]  # a function that is given the name and URL of a page
+# A function that is given the name and URL of a page, and its content if the URL alone does not show it
+Photograph = Callable[[str, str, str], Awaitable[None]]
+OTHER = "another visit"  # name under which the slot of the first trial is held, so that the queue is shown
 
 
 @dataclass
@@ -60,8 +70,12 @@ async def dry_run(
     store = await Store.open(f"sqlite:///{folder / 'study.db'}", study.settings.name, study.sha256)
     folders, rng = VisitFolders(folder / VISITS), np.random.default_rng(0)
     procedure = Procedure(plan_of(study, platform=platform), store, folders, rng)
-    app = VisitServer(procedure, pool, ServerOptions(b"dry run", workers=1)).app("127.0.0.1")
-    async with _serving(app) as base, httpx.AsyncClient(base_url=base, timeout=TIMEOUT_S) as client:
+    server = VisitServer(procedure, pool, ServerOptions(b"dry run", workers=1))
+    server.sessions.limit.hold(OTHER)
+    async with (
+        _serving(server.app("127.0.0.1")) as base,
+        httpx.AsyncClient(base_url=base, timeout=TIMEOUT_S) as client,
+    ):
         around = Surroundings(
             base,
             client,
@@ -73,13 +87,17 @@ async def dry_run(
             FACTOR,
             hasty=True,
         )
-        walk = _Walk(procedure, around, photograph)
+        walk = _Walk(procedure, around, photograph, server.sessions.limit)
         for planned in _ways(procedure):
             await walk.send(planned)
+        await walk.show_refusals()
         found = await collect(study, store, folder)
         walk.walked.faults += [
             f"the run that was recorded cannot be used: {why}" for why in found.unusable.values()
         ]
+        if found.rows:
+            write_collected(found, folder / TABLE)
+            walk.walked.faults += analysis_faults(study, folder / TABLE, folder / ANALYSIS, shortened=True)
         return walk.walked
 
 
@@ -107,8 +125,10 @@ def _ways(procedure: Procedure) -> Iterator[Planned]:
 
 
 class _Walk:
-    def __init__(self, procedure: Procedure, around: Surroundings, photograph: Photograph) -> None:
-        self._procedure, self._around, self._photograph = procedure, around, photograph
+    def __init__(
+        self, procedure: Procedure, around: Surroundings, photograph: Photograph, limit: SessionLimit
+    ) -> None:
+        self._procedure, self._around, self._photograph, self._limit = procedure, around, photograph, limit
         self.walked = Walked()
 
     async def send(self, planned: Planned) -> None:
@@ -118,9 +138,13 @@ class _Walk:
             if planned.leaves is None and name not in shown:
                 shown.append(name)
                 self.walked.words[name] = _words_of(page.text) if "data-trial" not in page.text else 0
-                await self._photograph(name, str(page.url))
+                await self._photograph(name, str(page.url), page.text if name.endswith(REFUSED) else "")
+                if name == TASK:
+                    await self._photograph(HELP, str(page.url), "")
+                if name == QUEUE:
+                    self._limit.release(OTHER)
             elif name == "withdrawal":
-                await self._photograph(name, str(page.url))
+                await self._photograph(name, str(page.url), "")
 
         gone = Rehearsed(planned.number)
         person = SimulatedPerson(planned, replace(self._around, watch=watch), gone)
@@ -148,7 +172,25 @@ class _Walk:
         if page.status_code != httpx.codes.OK or (code and code not in page.text):
             gone.faults.append(f"the last page of a participant who is {wanted} lacks the code {code}")
         in_a_phase = planned.leaves_in and wanted != "withdrawn"
-        await self._photograph(f"{planned.leaves_in}-{wanted}" if in_a_phase else wanted, str(page.url))
+        await self._photograph(f"{planned.leaves_in}-{wanted}" if in_a_phase else wanted, str(page.url), "")
+
+    async def show_refusals(self) -> None:
+        """Take pictures of the pages for participants who return elsewhere, time out, or are not admitted."""
+        store, recruiter = self._procedure.store, self._procedure.plan.recruiter
+        around, person = self._around, Rehearsed(LATE)
+        ids = {name: value or f"rehearsal{LATE:06d}" for name, value in around.parameters.items()}
+        await SimulatedPerson(replace(next(_ways(self._procedure)), number=LATE), around, person).begin()
+        changed = [ids, *({**ids, name: "elsewhere"} for name in ids)]
+        key, *others = (getattr(recruiter.arrive(one), "key", None) for one in changed)
+        if key is not None and key in others:  # the same participant with another submission
+            query = urlencode(changed[others.index(key) + 1])
+            await self._photograph("returning", f"{around.base}/?{query}", "")
+        await store.time_out(utc_now() + datetime.timedelta(days=1))
+        await self._photograph("timed_out", f"{around.base}{person.link}", "")
+        ids = {name: value or "new" for name, value in around.parameters.items()}
+        for name, state in (("paused", "paused"), ("full", "closed")):
+            await store.set_state(cast(StudyState, state), "check")
+            await self._photograph(name, f"{around.base}/?{urlencode(ids)}", "")
 
 
 def _words_of(page: str) -> int:

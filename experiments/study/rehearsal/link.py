@@ -17,6 +17,10 @@ ANSWER_TIMEOUT = 2.0  # maximum time to wait for a new state before the next inp
 DELAYED = 15  # number of initial inputs that are delayed on a slow connection
 OPENING_TIMEOUT = 600.0  # maximum time until a session is ready, in seconds
 VIEW = {"type": "view", "width": 1280, "height": 720, "codec": "none"}
+# The display report of a fast browser. It is sent after this number of inputs, which last 5 s.
+DISPLAY_EVERY = 8
+DISPLAY = {"type": "display", "draw": "browser", "renderer": "rehearsal", "width": 1280, "height": 720}
+DISPLAY |= {"pixel_ratio": 1.0, "frames_per_s": 60.0, "frame_ms": 16.7, "frame_ms_95": 20.0, "dropped": 0}
 
 
 class LostError(Exception):
@@ -65,6 +69,8 @@ class Link:
 
     async def _decide(self, delay: float) -> None:
         player, step = self._player, self._player.step
+        if self.decisions % DISPLAY_EVERY == 0:
+            await self.say(**DISPLAY)
         self._number += 1
         self.decisions += 1
         inputs = [{"number": self._number, "step": step, **player.act()}]

@@ -25,6 +25,8 @@ AWAY = 600.0  # longest absence of a returning participant, in seconds of study 
 DELAY = 0.2  # delay of the first inputs on a slow connection, in seconds
 CUTS = 3  # number of times that a bad connection is interrupted during a trial
 TRIES = 20  # maximum number of attempts to connect to a trial or to submit a form
+QUEUE = "queue"  # name of the queue page
+REFUSED = "-refused"  # end of the name of a page that refuses a form
 QUEUED = 'http-equiv="refresh"'  # text that identifies the queue page
 QUEUE_PAUSE = 3.0  # time between two requests for the queue page, in seconds
 PAUSE = 0.5  # delay before reconnecting to a trial, in seconds
@@ -103,6 +105,7 @@ class SimulatedPerson:
         while tries < TRIES:
             page = await self._get(self.rehearsed.link)
             if QUEUED in page.text:
+                await self._around.watch(QUEUE, page)
                 await asyncio.sleep(QUEUE_PAUSE)
                 continue
             found = SHOWN.search(page.text)
@@ -135,7 +138,7 @@ class SimulatedPerson:
     async def _send_early(self, phase: Phase) -> None:
         if self._around.minimum.get(phase.name, 0.0) > 0.0:
             await self._post(self.rehearsed.link, form_of(phase, self._rng))
-            if not await self._still_in(phase.name):
+            if not _shows(await self._get(self.rehearsed.link), phase):
                 self._fault(f"{phase.name} ends before its minimum time")
 
     def _ended(self, page: httpx.Response) -> str:
@@ -160,8 +163,10 @@ class SimulatedPerson:
         wrong = wrong_form(phase, form)
         if wrong is not None and (leaves == "fails" or careless):
             await self._post(link, wrong)
-            if leaves != "fails" and not await self._still_in(phase.name):
+            shown = await self._get(link)
+            if leaves != "fails" and not _shows(shown, phase):
                 self._fault(f"{phase.name} accepts a form that it should refuse")
+            await self._around.watch(f"{phase.name}{REFUSED}", shown)
             return
         if leaves == "refuses":
             form = {"phase": phase.name, "agree": "no"}
@@ -169,14 +174,10 @@ class SimulatedPerson:
             form = {**form, "latency_ms": "999999", "give_up": "yes"}
         sent = [self._post(link, form) for _ in range(2 if self._planned.twice else 1)]
         await asyncio.gather(*sent)
-        if not await self._still_in(phase.name):
+        if not _shows(await self._get(link), phase):
             self.rehearsed.answers[phase.name] = form
         elif tries:
             self._fault(f"the form of {phase.name} was not accepted")
-
-    async def _still_in(self, phase: str) -> bool:
-        found = SHOWN.search((await self._get(self.rehearsed.link)).text)
-        return found is not None and phase in found.groups()
 
     async def _leave(self, how: str) -> str:
         if how != "vanishes":
@@ -294,3 +295,8 @@ def _drawn(item: Item, points: int, rng: np.random.Generator) -> Any:
         case "number":
             return str(rng.integers(item.low, min(item.high, item.low + 60) + 1))
     return f"{MARK} ({rng.integers(10**6)})"
+
+
+def _shows(page: httpx.Response, phase: Phase) -> bool:
+    found = SHOWN.search(page.text)
+    return found is not None and phase.name in found.groups()

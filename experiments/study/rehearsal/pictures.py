@@ -23,6 +23,7 @@ MAX_HEIGHT = 6000  # maximum height of a screenshot, in pixels
 SETTLE = 1.5  # delay that lets the scripts of a page run before a screenshot, in seconds
 LOADING = 120.0  # timeout for loading a trial, in seconds
 LOADED = "!document.querySelector('#play') || !!document.querySelector('#panel-actions button')"
+HELP, OPEN_HELP = "help", "document.querySelector('#help-button').click()"
 START = 120.0  # timeout for the start of the browser, in seconds
 
 
@@ -45,17 +46,30 @@ class Camera:
         attached = await self._ask("Target.attachToTarget", targetId=tab["targetId"], flatten=True)
         self._session = attached["sessionId"]
 
-    async def photograph(self, name: str, url: str) -> None:
-        """Take a screenshot of a whole page at each window size."""
+    async def photograph(self, name: str, url: str, content: str = "") -> None:
+        """Take a screenshot of a whole page at each window size.
+
+        Args:
+            content: HTML to show instead of the page's own, such as the answer to a form.
+        """
         self.taken.append(f"{len(self.taken) + 1:02d}-{name.replace(':', '-')}")
         for size, (width, height) in SIZES.items():
             screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": size == "phone"}
             await self._ask("Emulation.setDeviceMetricsOverride", **screen)
+            await self._ask("Emulation.setTouchEmulationEnabled", enabled=size == "phone")
             await self._ask("Page.navigate", url=url)
             await self._settle()
-            content = (await self._ask("Page.getLayoutMetrics"))["cssContentSize"]
+            if content:
+                tree = await self._ask("Page.getFrameTree")
+                await self._ask(
+                    "Page.setDocumentContent", frameId=tree["frameTree"]["frame"]["id"], html=content
+                )
+                await asyncio.sleep(SETTLE)
+            if name == HELP:
+                await self._ask("Runtime.evaluate", expression=OPEN_HELP)
+            size_of_page = (await self._ask("Page.getLayoutMetrics"))["cssContentSize"]
             clip = {"x": 0, "y": 0, "width": width, "scale": 1}
-            clip["height"] = min(max(height, content["height"]), MAX_HEIGHT)
+            clip["height"] = min(max(height, size_of_page["height"]), MAX_HEIGHT)
             shot = await self._ask("Page.captureScreenshot", captureBeyondViewport=True, clip=clip)
             (self._folder / f"{self.taken[-1]}-{size}.png").write_bytes(base64.b64decode(shot["data"]))
         await self._ask("Page.navigate", url="about:blank")  # leaving the page ends the session of a trial

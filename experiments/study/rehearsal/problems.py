@@ -4,10 +4,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from experiments.errors import ConfigError
-from experiments.study.file import Study, line_of
+from experiments.study.file import Study
 from experiments.study.recruitment import recruiter
+from experiments.trials.toml_file import TomlFile
 from experiments.visit.plan import COMPREHENSION, CONSENT
-from mjsim.support.files import read_text
 
 PAID = ("prolific", "connect", "external-question")  # platforms that pay participants
 EXAMPLES = ("your institution", "example.org", "example.com")
@@ -90,6 +90,6 @@ def problems_of_length(study: Study, shortest: float, longest: float) -> list[Pr
 
 
 def located(study: Study, problems: Sequence[Problem]) -> list[str]:
-    text = read_text(study.path)
-    lines = [(line_of(text, problem.key) or 1, problem.text) for problem in problems]
+    file = TomlFile.read(study.path, "study")
+    lines = [(file.line(problem.key) or 1, problem.text) for problem in problems]
     return [f"{study.path}, line {line}: {words}" for line, words in sorted(lines)]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 
+from experiments.analysis.study.table import ANALYSIS
 from experiments.errors import ConfigError
 from experiments.record.files import read_json
 from experiments.study.data.collect import check_people, collect, write_collected
@@ -52,7 +53,9 @@ class RehearsalReport:
 async def report(
     study: Study, settings: RehearsalSettings, store: Store, people: Sequence[Rehearsed], out: Path
 ) -> RehearsalReport:
-    """Record payments, export the data, check the database, and write the report of the rehearsal."""
+    """Record payments, export and analyse the data, check the database, and write the rehearsal's report."""
+    from experiments.study.data.analyses import analysis_faults  # `study pay` needs no statistics
+
     study, served = replace(study, rehearsal=True), out / SERVED
     known = {person.token_hash: person for person in await store.people()}
     faults = [f"person {one.number}: {fault}" for one in people for fault in one.faults]
@@ -74,6 +77,7 @@ async def report(
         note_copy(served, "table", out / TABLE)
         write_collected(found, out / TABLE)
         await export(study, store, served, out / EXPORT, replace=True)
+    faults += analysis_faults(study, out / TABLE, out / ANALYSIS)
     counts = (await store.counts()).cells
     made = RehearsalReport(
         settings,

@@ -216,13 +216,11 @@ class Comprehension(FormPhase):
         read = super().read(visitor, sent)
         if isinstance(read, Again):
             return dataclasses.replace(read, counts=False)
-        again = Again(self.texts["wrong"], {"form": self._form(None, read.answers)})
-        if sent.get("attempt", str(visitor.attempts)) != str(visitor.attempts):
-            return dataclasses.replace(
-                again, counts=False
-            )  # the attempt of this page has already been counted
         if not any(item.is_wrong(read.answers.get(item.name)) for item in self.items):
             return read
+        again = Again(self.texts["wrong"], {"form": self._form(None, read.answers)})
+        if sent.get("attempt", str(visitor.attempts)) != str(visitor.attempts):
+            return dataclasses.replace(again, counts=False)  # this page was sent before
         limit = self._plan.limits.attempts
         last = limit is not None and visitor.attempts + 1 >= limit
         return Done(read.answers, "screened_out") if last else again

@@ -10,6 +10,7 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
+from experiments.visit.plan import DEVICE
 from experiments.visit.procedure import Procedure
 from experiments.visit.recruiter import Candidate, InvalidLink, Preview
 from experiments.visit.server.pages import VisitPages
@@ -59,6 +60,7 @@ class Admission:
             parameters={name: ids.get(name, "") for name in self._recruiter.parameters},
             remembers=platform == "link",
             forgets=platform == "lab",
+            device=self._plan.device if DEVICE in self._plan.phases else None,
             **values,
         )
 

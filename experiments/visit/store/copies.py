@@ -76,7 +76,12 @@ async def restore(path: Path, url: str) -> None:
         source, target = Database(f"sqlite:///{copy}"), Database(url)
         try:
             await source.check()
-            await upgrade(source)
+            try:
+                await upgrade(source, create=False)
+            except StoreError as error:  # the message must not name the temporary copy
+                raise StoreError(str(error).replace(source.name, str(path))) from error
+            if not await _rows(source):
+                raise StoreError(f"The backup {path} holds no study: name a file of `mjsim study backup`.")
             await upgrade(target)
             if await _rows(target):
                 raise StoreError(f"The database {target.name} is not empty: restore into a new one.")

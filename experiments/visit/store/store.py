@@ -42,7 +42,14 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
 
     @classmethod
     async def open(
-        cls, url: str, study_name: str, file_hash: str, *, password_memory_kib: int = PASSWORD_MEMORY_KIB
+        cls,
+        url: str,
+        study_name: str,
+        file_hash: str,
+        *,
+        create: bool = True,
+        alone: bool = False,
+        password_memory_kib: int = PASSWORD_MEMORY_KIB,
     ) -> Self:
         """Open a database, create or upgrade its tables, and find or add the study.
 
@@ -50,13 +57,16 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
             url: `sqlite:///FILE`, `mysql://USER:PASSWORD@HOST/NAME` or `postgresql://USER:PASSWORD@HOST/NAME`.
             study_name: Name of the study. A database may hold several.
             file_hash: Hexadecimal SHA-256 of the study file. If it has changed, this is recorded in the audit log.
+            create: False to raise StoreError if the database has no such study.
+            alone: True to raise StoreError if the study would have to be added to another one.
             password_memory_kib: Memory needed to hash a researcher's password, in KiB.
         """
         database = Database(url)
         try:
             await database.check_durable()
-            await upgrade(database)
-            return cls(database, await _study_id(database, study_name, file_hash), password_memory_kib)
+            await upgrade(database, create=create)
+            number = await _study_id(database, study_name, file_hash, create, alone)
+            return cls(database, number, password_memory_kib)
         except BaseException:
             await database.close()
             raise
@@ -134,7 +144,7 @@ async def change_database(path: Path, study_name: str, work: Callable[[Store], A
             one_file(path)
 
 
-async def _study_id(database: Database, name: str, file_hash: str) -> int:
+async def _study_id(database: Database, name: str, file_hash: str, create: bool, alone: bool) -> int:
     now = utc_now()
 
     async def work(connection: AsyncConnection) -> int:
@@ -143,6 +153,12 @@ async def _study_id(database: Database, name: str, file_hash: str) -> int:
             await connection.execute(select(*columns).where(study.c.name == name).with_for_update())
         ).first()
         if row is None:
+            names = (await connection.execute(select(study.c.name))).scalars().all()
+            if (alone and names) or not create:
+                raise StoreError(
+                    f"The database {database.name} has no study {name!r} (it has: {', '.join(names) or 'none'}): name "
+                    "its study file, or the folder of this study."
+                )
             made = await connection.execute(
                 insert(study).values(name=name, file_hash=file_hash, state="open", created=now, quotas={})
             )

@@ -18,16 +18,19 @@ VERSIONS = "alembic_version"
 LOCK = 7_303_014  # arbitrary number that identifies the lock for upgrades
 
 
-async def upgrade(database: Database, migrations: Path = MIGRATIONS) -> None:
+async def upgrade(database: Database, migrations: Path = MIGRATIONS, *, create: bool = True) -> None:
     """Create the tables, or migrate existing tables and their rows to the current schema.
 
-    Raises StoreError if the tables are from a newer version of mjsim or from another program.
+    Raises StoreError if the tables are from a newer version of mjsim or from another program, or if there are no
+    tables and `create` is false.
     """
+    if not create and database.kind == "sqlite" and not Path(database.url.database or "").is_file():
+        raise StoreError(f"There is no database {database.name}: name the one of `mjsim study serve`.")
 
     async def work(connection: AsyncConnection) -> None:
         await _lock(connection, database.kind)
         try:
-            await connection.run_sync(_upgrade, migrations, database.name)
+            await connection.run_sync(_upgrade, migrations, database.name, create)
         finally:
             if database.kind == "mysql":
                 await connection.execute(text("DO RELEASE_LOCK(:name)"), {"name": f"mjsim{LOCK}"})
@@ -48,7 +51,7 @@ async def _lock(connection: AsyncConnection, kind: str) -> None:
         await connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": LOCK})
 
 
-def _upgrade(connection: Connection, migrations: Path, name: str) -> None:
+def _upgrade(connection: Connection, migrations: Path, name: str, create: bool) -> None:
     config = Config()
     config.set_main_option("script_location", str(migrations).replace("%", "%%"))
     config.attributes["connection"] = connection
@@ -58,10 +61,13 @@ def _upgrade(connection: Connection, migrations: Path, name: str) -> None:
         raise StoreError(
             f"The database {name} was made by a newer mjsim (its form is {current!r}): install that version."
         )
-    tables = set(inspect(connection).get_table_names())
-    if VERSIONS not in tables and tables & set(metadata.tables):
+    tables, sqlite = set(inspect(connection).get_table_names()), connection.dialect.name == "sqlite"
+    # A database server may be shared with other programs, but a SQLite file may not.
+    if VERSIONS not in tables and (tables if sqlite else tables & set(metadata.tables)):
         raise StoreError(
             f"The database {name} holds tables of another program: give the study one of its own."
         )
+    if current is None and not create:
+        raise StoreError(f"{name} is not the database of a study: name the one of `mjsim study serve`.")
     if current != script.get_current_head():
         command.upgrade(config, "head")

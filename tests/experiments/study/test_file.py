@@ -39,14 +39,14 @@ def test_the_survey_asks_what_the_analysis_reads():
 @pytest.mark.parametrize(
     ("before", "after", "line", "value"),
     [
-        ("reward = 7.50", 'reward = "much"', "reward", "`$.study.pay.reward`"),
+        ("reward = 7.50", 'reward = "much"', "reward", "study.pay.reward is 'much'"),
         ("reward = 7.50", "rewards = 7.50", "rewards", "`rewards`"),
-        ("story = 20", "story = -1", r"\[study.minimum\]", "`$.study.minimum"),
-        ("minutes = 25", "minutes = 0", "minutes", "`$.study.minutes`"),
+        ("story = 20", "story = -1", "story", "minimum.story is -1"),
+        ("minutes = 25", "minutes = 0", "minutes", "study.minutes is 0"),
         ('assignment = "uniform"', 'assignment = "fair"', "assignment", "'fair'"),
         ("minutes = 25", 'minutes = 25\nphases = ["task", "consent", "completion"]', None, "in the order"),
         ("minutes = 25", 'minutes = 25\nphases = ["consent", "completion"]', None, "needs the phase task"),
-        ("minutes = 25", 'minutes = 25\noptional = ["consent"]', None, "consent cannot be optional"),
+        ("minutes = 25", 'minutes = 25\noptional = ["consent"]', None, "optional names 'consent'"),
         ("minutes = 25", 'minutes = 25\nlanguage = "xx"', None, "no texts in language 'xx'"),
     ],
 )

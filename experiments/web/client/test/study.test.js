@@ -87,6 +87,24 @@ describe("device check", () => {
   });
 });
 
+describe("the first page", () => {
+  const shown = async (/** @type {{ touch: boolean, keyboard: string, width: number }} */ { touch, keyboard, width }) => {
+    vi.resetModules();
+    vi.stubGlobal("matchMedia", () => ({ matches: touch }));
+    vi.stubGlobal("screen", { width, height: Math.round(width / 2) });
+    document.body.innerHTML = `<p id="unsuitable" data-width="800" data-keyboard="${keyboard}" hidden></p>`;
+    await import("../static/study/suitable.js");
+    return !(/** @type {HTMLElement} */ (document.getElementById("unsuitable")).hidden);
+  };
+
+  test("says that a phone cannot take part, and says nothing on a computer", async () => {
+    expect(await shown({ touch: true, keyboard: "yes", width: 844 })).toBe(true);
+    expect(await shown({ touch: true, keyboard: "no", width: 700 })).toBe(true);
+    expect(await shown({ touch: true, keyboard: "no", width: 1024 })).toBe(false);
+    expect(await shown({ touch: false, keyboard: "yes", width: 1280 })).toBe(false);
+  });
+});
+
 test("the researcher page refreshes its live numbers and keeps everything else", async () => {
   vi.useFakeTimers();
   vi.stubGlobal("fetch", async () => new Response(`<p id="people" data-live>2</p><input id="wanted" value="3">`));

@@ -1,15 +1,18 @@
 """The table of a study: a row for each person who has played, with answers, and without ids or formulas."""
 
 import asyncio
+import json
 import os
 import shutil
 import signal
 from collections.abc import Mapping
 
 import pytest
+from study_people import made_up_people
 
 from experiments.cli.main import main
-from experiments.study.data.collect import TEXTS, collect, harmless, write_collected
+from experiments.study.data.analyses import analysis_faults
+from experiments.study.data.collect import TEXTS, Collected, collect, harmless, survey_of, write_collected
 from experiments.study.data.copies import copies
 from experiments.study.file import read_people_study
 from experiments.trials.designs import FOLDER
@@ -180,3 +183,69 @@ async def _filled(study_file, folder, run):
     store = await Store.open(f"sqlite:///{folder / 'study.db'}", study.settings.name, study.sha256)
     await _fill(store, folder, run)
     await store.close()
+
+
+OWN_SURVEY = """
+[survey]
+scale = ["1", "2", "3", "4", "5", "6", "7"]
+[[survey.item]]
+name = "calm"
+kind = "scale"
+text = "I felt calm."
+[[survey.item]]
+name = "useful"
+kind = "scale"
+text = "It helped."
+"""
+PEOPLE = {("none", 6): 8, ("optimal", 6): 8}
+
+
+@pytest.fixture
+def own_study(tmp_path):
+    """A study with items and a scale of its own."""
+    path = tmp_path / "study.toml"
+    assert main(["study", "init", str(path)]) == 0
+    path.write_text(path.read_text().replace('# texts = "texts.toml"', 'texts = "texts.toml"'))
+    (tmp_path / "texts.toml").write_text(OWN_SURVEY)
+    return read_people_study(path)
+
+
+def test_items_and_scale_of_ones_own_are_analysed_and_preregistered(tmp_path, own_study, capsys):
+    assert survey_of(own_study).items == {"calm": "I felt calm.", "useful": "It helped."}
+    frozen, table = str(tmp_path / "frozen.zip"), tmp_path / "table"
+    assert main(["study", "preregister", str(own_study.path), "--out", frozen]) == 0
+    rows = [
+        row
+        | {"user": "human", "participant": f"p{k}", "display_frames_per_s": 60.0}
+        | {"likert_calm": 1 + k % 7, "likert_useful": 1 + k % 5}
+        for k, row in enumerate(made_up_people(PEOPLE))
+    ]
+    write_collected(Collected(rows, [], {}, {}, survey_of(own_study)), table)
+    assert main(["study", "analyze", str(table), "--preregistration", frozen]) == 0, capsys.readouterr().err
+    page = (table / "analysis" / "report.html").read_text()
+    assert "I felt calm." in page and "Help useful" in page and "to 7 (violet, agree)" in page
+    assert "The measures differ" not in page
+    write_collected(
+        Collected([rows[0] | {"likert_calm": 8}, *rows[1:]], [], {}, {}, survey_of(own_study)), table
+    )
+    assert main(["study", "analyze", str(table), "--force"]) == 2
+    assert "likert_calm has the answer 8; answers are whole numbers from 1 to 7" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("column", "fault"), [("display_frames_per_s", None), ("display_frames", "no column 'display_frames'")]
+)
+def test_rules_about_displays_spare_simulated_people_and_unknown_columns_are_a_fault(
+    tmp_path, own_study, column, fault
+):
+    path = own_study.path
+    path.write_text(path.read_text().replace('"display_frames_per_s"', f'"{column}"'))
+    rows = [row | {"user": "rehearsal"} for row in made_up_people(PEOPLE)]
+    write_collected(Collected(rows, [], {}, {}, survey_of(own_study)), tmp_path / "table")
+    faults = analysis_faults(read_people_study(path), tmp_path / "table", tmp_path / "analysis")
+    if fault is not None:
+        assert [fault in one for one in faults] == [True]
+        return
+    assert faults == []
+    notes = json.loads((tmp_path / "analysis" / "stats.json").read_text())["notes"]
+    assert [note for note in notes if "display_frames_per_s < 15.0 is not applied" in note]

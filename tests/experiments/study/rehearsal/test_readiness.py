@@ -171,7 +171,7 @@ class _Sloppy(FormPhase):
 def _walked(study, folder, monkeypatch, phases=None):
     pictures = []
 
-    async def photograph(name, _):
+    async def photograph(name, *_):
         pictures.append(name)
 
     if phases:
@@ -187,9 +187,16 @@ def test_a_dry_run_goes_every_way_that_there_is(study, tmp_path, monkeypatch):
     walked, pictures = _walked(study, tmp_path, monkeypatch)
     (unplayed,) = walked.faults
     assert "the run that was recorded cannot be used" in unplayed
+    refused = {name: f"{name}-refused" for name in ("consent", "device", "comprehension", "survey")}
+    more = {**refused, "comprehension-refused": "queue", "task": "help"}
+    phases = []
+    for phase in study.settings.phases[:-1]:
+        while phase is not None:
+            phases.append(phase)
+            phase = more.get(phase)
     assert pictures == [
-        "welcome", *study.settings.phases[:-1], "finished", "consent-no_consent", "device-screened_out",
-        "comprehension-screened_out", "withdrawal", "withdrawn",
+        "welcome", *phases, "finished", "consent-no_consent", "device-screened_out",
+        "comprehension-screened_out", "withdrawal", "withdrawn", "timed_out", "paused", "full",
     ]  # fmt: skip
     assert walked.words["consent"] > 100 and walked.words["survey"] > 200
 
@@ -225,7 +232,8 @@ def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
         phases=("minutes = 10", f"minutes = 10\n{phases}\n[study.recruitment]\n{settings}"),
         minimum=("story = 20", ""),
     )
-    walked, _ = _walked(changed, tmp_path, monkeypatch)
+    walked, pictures = _walked(changed, tmp_path, monkeypatch)
+    assert ("returning" in pictures) is ("sites" in settings or "5f000000" in settings)
     assert [fault for fault in walked.faults if "cannot be used" not in fault] == []
 
 

@@ -1,5 +1,6 @@
 """Rehearsals: a seed plans the same people, a small study passes, is continued, and is kept apart from people."""
 
+import asyncio
 import hashlib
 import json
 import os
@@ -15,8 +16,12 @@ from check_rehearsal import check
 
 from experiments.cli.main import main
 from experiments.record.phases import REHEARSED
+from experiments.study.file import read_people_study
 from experiments.study.rehearsal.plan import plan_people
+from experiments.study.rehearsal.report import report
+from experiments.study.rehearsal.run import RehearsalSettings
 from experiments.visit.plan import PHASES
+from experiments.visit.store import Store
 
 STUDY = """
 [all_cells]
@@ -88,6 +93,8 @@ def test_nobody_is_paid_before_a_rehearsal_has_passed(tmp_path, study, capsys):
     served, out = tmp_path / "served", tmp_path / "rehearsal"
     served.mkdir()
     out.mkdir()
+    add = ["study", "researcher", "add", str(study), str(served), "ada", "--role", "owner", "--generate"]
+    assert main(add) == 0, "this makes the database"
     sha = hashlib.sha256(study.read_bytes()).hexdigest()
     words = ["study", "pay", str(study), str(served), "--database", f"sqlite:///{served}/study.db"]
     paid = [*words, "--paid", "p00001-reward", "--reference", "receipt"]
@@ -101,6 +108,49 @@ def test_nobody_is_paid_before_a_rehearsal_has_passed(tmp_path, study, capsys):
     for further in (["--rehearsal", str(out)], []):  # it is asked for once
         assert main([*paid, *further]) == 2
         assert "p00001-reward" in capsys.readouterr().err
+
+
+async def _empty_rehearsal(study, out):
+    store = await Store.open(f"sqlite:///{out / 'study.db'}", study.settings.name, study.sha256)
+    try:
+        return await report(study, RehearsalSettings(study.sha256, 1, 0, 2.0, 0.2, 20.0), store, [], out)
+    finally:
+        await store.close()
+
+
+def test_a_rehearsal_that_cannot_be_analysed_has_not_passed(tmp_path, study):
+    found = asyncio.run(_empty_rehearsal(read_people_study(study), tmp_path))
+    assert not found.passed and found.faults[0].startswith("the analysis cannot be computed: ")
+    assert json.loads((tmp_path / "rehearsal.json").read_text())["passed"] is False
+
+
+def test_another_study_or_folder_is_not_opened_as_an_empty_study(tmp_path, study, capsys):
+    served = tmp_path / "served"
+    add = ["study", "researcher", "add", str(study), str(served), "ada", "--role", "owner", "--generate"]
+    assert main(add) == 0
+    other = tmp_path / "other.toml"
+    other.write_text(STUDY.replace('name = "small"', 'name = "other"'))
+    for words in (["pay", "--dry-run"], ["hosts"], ["collect", "--out", str(tmp_path / "table")]):
+        assert main(["study", words[0], str(other), str(served), *words[1:]]) == 2, words
+        assert "has no study 'other' (it has: small)" in capsys.readouterr().err
+    words = [
+        "study",
+        "serve",
+        str(other),
+        "--out",
+        str(served),
+        "--port",
+        "0",
+        "--no-open",
+        "--film",
+        str(study),
+    ]
+    assert main(words) == 2, "a folder holds one study"
+    assert "it has: small" in capsys.readouterr().err
+    assert main(["study", "researcher", "list", str(study), str(tmp_path / "typo")]) == 2
+    (tmp_path / "empty.db").touch()
+    assert main(["study", "restore", str(tmp_path / "empty.db"), str(tmp_path / "new.db")]) == 2
+    assert not (tmp_path / "typo").exists() and not (tmp_path / "new.db").exists()
 
 
 @pytest.mark.slow

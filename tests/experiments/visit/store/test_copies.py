@@ -10,7 +10,10 @@ from sqlalchemy import select
 
 from experiments.errors import StoreError
 from experiments.visit.store import CellQuota, Store, copies, restore
+from experiments.visit.store.copies import one_file
+from experiments.visit.store.engine import Database
 from experiments.visit.store.tables import metadata
+from experiments.visit.store.upgrade import upgrade
 
 pytestmark = pytest.mark.anyio
 
@@ -189,3 +192,34 @@ async def test_a_backup_for_which_the_disk_is_too_small_leaves_nothing(store, tm
     with pytest.raises(OSError, match="No space"):
         await store.backup(folder / "b.db")
     assert not list(folder.iterdir())
+
+
+async def test_only_the_backup_of_a_study_is_restored(tmp_path):
+    empty, foreign, tables = (tmp_path / name for name in ("empty.db", "foreign.db", "tables.db"))
+    empty.touch()
+    with sqlite3.connect(foreign) as database:
+        database.execute("CREATE TABLE notes (id INTEGER)")
+    await upgrade(database := Database(f"sqlite:///{tables}"))
+    await database.close()
+    one_file(tables)
+    for path, why in (
+        (empty, "not the database of a study"),
+        (foreign, "another program"),
+        (tables, "no study"),
+    ):
+        with pytest.raises(StoreError, match=f"{path.name}.*{why}"):
+            await restore(path, f"sqlite:///{tmp_path / 'new.db'}")
+    assert not (tmp_path / "new.db").exists()
+
+
+async def test_a_study_is_only_added_where_that_is_wanted(tmp_path):
+    url = f"sqlite:///{tmp_path / 'study.db'}"
+    with pytest.raises(StoreError, match="There is no database"):
+        await Store.open(url, "pilot", "0" * 64, create=False)
+    assert not (tmp_path / "study.db").exists()
+    await (await Store.open(url, "pilot", "0" * 64, alone=True)).close()
+    for refused in ({"create": False}, {"alone": True}):
+        with pytest.raises(StoreError, match=r"no study 'other'.*it has: pilot"):
+            await Store.open(url, "other", "0" * 64, **refused)
+    await (await Store.open(url, "pilot", "0" * 64, create=False)).close()
+    await (await Store.open(url, "other", "0" * 64)).close()  # a database may hold several studies

@@ -1,10 +1,15 @@
 """Where things are on the page of a task, in windows of all shapes."""
 
+from pathlib import Path
+
 import pytest
 
+import experiments.web
 from benchmarks.play import FAST
 from benchmarks.support.play_server import PATIENCE, PlayProcess
 
+STYLE = Path(experiments.web.__file__).parent / "client" / "static" / "style.css"
+CHOICE = "<fieldset class=question><label><input type=radio> <span>{}</span></label></fieldset>"
 SHAPES = {"wide": (1280, 720), "4:3": (1024, 768), "narrow": (800, 600), "phone": (390, 844)}
 # Windows in which parts were cut off, and the least font size and width of the map in each, in px. One is as small as
 # a window of 1280 x 720 px at 200 % zoom.
@@ -148,3 +153,11 @@ def test_the_page_of_a_task_in_windows_of_all_shapes(tmp_path, chromium):
         page.set_viewport_size({"width": 1280, "height": 720})
         page.get_by_role("button", name="Full screen").click()
         page.locator("#play:fullscreen, :fullscreen #play").wait_for()
+
+
+def test_the_text_of_a_choice_does_not_run_under_its_button_on_a_phone(chromium):
+    page = chromium.new_page(viewport={"width": 390, "height": 844})
+    page.set_content(f"<style>{STYLE.read_text()}</style>{CHOICE.format('many long words ' * 12)}")
+    button, text = (page.locator(at).bounding_box() for at in ("input", "span"))
+    assert text["x"] >= button["x"] + button["width"]
+    assert text["height"] > 2 * button["height"], "it has several lines"

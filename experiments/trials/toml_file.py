@@ -1,0 +1,145 @@
+"""Read TOML files, and describe their faults by line, key, value and choices."""
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from msgspec import inspect
+
+from experiments.errors import ConfigError, shown
+from mjsim.support.files import read_text
+
+_AT = re.compile(r" - at `(?:key` in `)?\$\.?([^`]*)`$")  # the path in an error message of msgspec
+_UNKNOWN = re.compile(r"unknown field `([^`]+)`")
+_HEADER = re.compile(r"\s*\[(\[?)\s*([\w.\"-]+)\s*\]")
+_KEY = re.compile(r"\s*([\w.\"-]+)\s*=")
+_WORD = re.compile(r"\w+(?:[.-]\w+)*")
+_CELL = re.compile(r"^cells\[\d+\]")
+_MISSING = object()
+
+
+@dataclass(frozen=True)
+class TomlFile:
+    """A parsed TOML file. Keys are written like `study.pay.reward` or `cells[0].objects`."""
+
+    path: Path
+    text: str
+    content: Mapping[str, Any]
+
+    @classmethod
+    def read(cls, path: Path, what: str) -> Self:
+        """Read a file. Raises `ConfigError` if it is not TOML. `what` names its content in the message."""
+        try:
+            text = read_text(path)
+            return cls(path, text, tomllib.loads(text))
+        except OSError as error:
+            raise ConfigError(f"cannot read {what} {path}: {error.strerror}") from error
+        except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+            raise ConfigError(f"{path} is not TOML: {error}") from error
+
+    def fault(self, error: Exception, table: str = "", kind: Any = None) -> ConfigError:
+        """Describe an error that the content of a table has caused.
+
+        The key comes from the path in a message of msgspec, or is the first key of the table in the message.
+
+        Args:
+            kind: Type of the whole file, from which the choices are taken.
+        """
+        message, key = str(error), table
+        if found := _AT.search(message):
+            key, message = _joined(table, found[1]), message[: found.start()]
+        if unknown := _UNKNOWN.search(message):
+            key = _joined(key, unknown[1])
+        elif table and message.startswith(f"{table}."):
+            key = message.partition(" ")[0]
+        elif isinstance(values := self.value(key), Mapping):
+            key = _joined(key, _named(values, message))
+        line, value, told = self.line(key), self.value(key), _in_a_sentence(message, kind, key)
+        where = f"{self.path}, line {line}" if line else str(self.path)
+        if value is _MISSING or isinstance(value, Mapping):
+            return ConfigError(f"{where}: {'' if told.startswith(key) else f'{key}: '}{told}")
+        is_told = key.rpartition(".")[2] in told and str(value) in told
+        return ConfigError(f"{where}: {'' if is_told else f'{key} is {shown(value)}; '}{told}")
+
+    def value(self, key: str) -> Any:
+        """Return the value of a key. The value of a cell includes the table `all_cells`."""
+        found: Any = self.content
+        for part in re.findall(r"[^.\[\]]+", key):
+            try:
+                found = found[int(part)] if isinstance(found, list) else found[part]
+            except (KeyError, IndexError, TypeError, ValueError):
+                return _MISSING
+            if isinstance(found, Mapping) and part.isdecimal() and _CELL.match(key):
+                found = {**self.content.get("all_cells", {}), **found}
+        return found
+
+    def line(self, key: str) -> int | None:
+        """Return the line number of a key, or of the innermost table that should contain the key."""
+        lines = dict(reversed(list(self._lines())))
+        while key:
+            if found := lines.get(key) or lines.get(_CELL.sub("all_cells", key) if "." in key else key):
+                return found
+            key = key[: max(key.rfind("."), key.rfind("["), 0)]
+        return None
+
+    def _lines(self) -> Iterator[tuple[str, int]]:
+        table, counts = "", dict[str, int]()
+        for number, line in enumerate(self.text.splitlines(), 1):
+            if header := _HEADER.match(line):
+                table = header[2].replace('"', "")
+                if header[1]:
+                    counts[table] = counts.get(table, -1) + 1
+                for name, index in counts.items():
+                    if f"{table}.".startswith(f"{name}."):
+                        table = f"{name}[{index}]{table[len(name) :]}"
+                yield table, number
+            elif key := _KEY.match(line):
+                yield _joined(table, key[1].replace('"', "")), number
+
+
+def _joined(table: str, key: str) -> str:
+    return f"{table}{'' if key.startswith('[') else '.'}{key}".strip(".") if key else table
+
+
+def _named(values: Mapping[str, Any], message: str) -> str:
+    """Return the first key of a table that a message names, in the singular or plural, or an empty string."""
+    keys = {key.rpartition(".")[2]: key for key in reversed(list(_keys(values)))}
+    keys |= {key: key for key in _keys(values)}
+    words = (form for word in _WORD.findall(message) for form in (word, f"{word}s"))
+    return next((keys[word] for word in words if word in keys), "")
+
+
+def _keys(values: Mapping[str, Any]) -> Iterator[str]:
+    for name, value in values.items():
+        yield name
+        if isinstance(value, Mapping):
+            yield from (f"{name}.{key}" for key in _keys(value))
+
+
+def _in_a_sentence(message: str, kind: Any, key: str) -> str:
+    told = message.removeprefix("Object contains ").removeprefix("Object is ").removeprefix("Object ")
+    told = told[:1].lower() + told[1:] if message.startswith(("Object", "Expected")) else told
+    if kind is None:
+        return told
+    if "unknown field" in message:
+        fields = getattr(_type(kind, key.rpartition(".")[0]), "fields", ())
+        return f"{told}; there are {', '.join(field.encode_name for field in fields)}" if fields else told
+    if isinstance(found := _type(kind, key), inspect.LiteralType):
+        return f"choose one of {', '.join(map(str, found.values))}"
+    return told
+
+
+def _type(kind: Any, key: str) -> Any:
+    """Return the type of a key in a file of type `kind`, as described by `msgspec.inspect`."""
+    found: Any = inspect.type_info(kind)
+    for part in [*re.findall(r"[^.\[\]]+", key), None]:
+        if isinstance(found, inspect.UnionType):
+            found = next(one for one in found.types if not isinstance(one, inspect.NoneType))
+        if isinstance(found, inspect.StructType) and part is not None:
+            found = next((field.type for field in found.fields if field.encode_name == part), None)
+        elif part is not None:
+            found = getattr(found, "item_type", getattr(found, "value_type", None))
+    return found

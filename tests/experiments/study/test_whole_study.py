@@ -1,0 +1,118 @@
+"""The file of `mjsim study init` goes through all commands, with no other edit than those that `check` asks for."""
+
+import asyncio
+import dataclasses
+import subprocess
+import sys
+from contextlib import AsyncExitStack
+
+import httpx
+import numpy as np
+import pytest
+
+from experiments.cli.main import main
+from experiments.cli.server import http_server, listen, url_of
+from experiments.cli.study.database import sqlite_url
+from experiments.house import House
+from experiments.session.video import VideoWriter
+from experiments.study.file import read_people_study
+from experiments.study.plan import plan_of
+from experiments.study.rehearsal.person import Rehearsed, SimulatedPerson, Surroundings
+from experiments.study.rehearsal.plan import Planned
+from experiments.visit.folders import VisitFolders
+from experiments.visit.procedure import Procedure
+from experiments.visit.server.app import ServerOptions, VisitServer
+from experiments.visit.store import Store
+from experiments.web.server.pool import WorkerPool
+
+PATIENCE = 120.0  # s
+ASKED_FOR = (("your institution", "A university"), ("you@example.org", "people@university.edu"))
+
+
+@pytest.fixture
+def study(tmp_path):
+    """The file of `study init` with an institution and an address."""
+    path = tmp_path / "study.toml"
+    assert main(["study", "init", str(path)]) == 0
+    text = path.read_text()
+    for before, after in ASKED_FOR:
+        assert before in text
+        text = text.replace(before, after)
+    path.write_text(text)
+    return path
+
+
+def film(path):
+    with VideoWriter(path, width=160, height=120) as video:
+        video.write(np.zeros((120, 160, 3), np.uint8))
+    return path
+
+
+def start_once(command):
+    """Start the server, look at its first page, and stop it."""
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            url = server.stdout.readline().strip()
+            assert httpx.get(url, timeout=PATIENCE).status_code == 200
+        finally:
+            server.terminate()
+        assert server.wait(PATIENCE) in (0, 143)
+
+
+async def take_part(path, folder, film_file, people):
+    """Let simulated people take part in the served study like real ones, but without waiting."""
+    study = read_people_study(path)
+    store = await Store.open(sqlite_url(folder / "study.db"), study.settings.name, study.sha256, create=False)
+    plan = dataclasses.replace(plan_of(study, film_file), rehearsal=True, minimum={})
+    procedure = Procedure(plan, store, VisitFolders(folder / "visits"), np.random.default_rng(0))
+    house = study.cells[0].trial(0).house
+    server = VisitServer(procedure, WorkerPool(house), ServerOptions(b"secret", workers=2))
+    async with AsyncExitStack() as stack:
+        listener = stack.enter_context(listen("127.0.0.1", 0))
+        base, http = url_of(listener).rstrip("/"), http_server(server.app("127.0.0.1"))
+        serving = asyncio.create_task(http.serve([listener]))
+        client = await stack.enter_async_context(httpx.AsyncClient(base_url=base, timeout=PATIENCE))
+        phases = {phase.name: phase for phase in procedure.phases}
+        around = Surroundings(base, client, phases, House.load(house), {}, {}, 3, 1e6)
+        gone = [Rehearsed(number) for number in range(people)]
+        for one in gone:
+            planned = Planned(one.number, one.number, 0.0, None, "", None, None, False, False, False)
+            person = SimulatedPerson(planned, around, one)
+            await person.begin()
+            await person.go()
+        http.should_exit = True
+        await serving
+    return gone
+
+
+@pytest.mark.slow
+def test_the_file_of_init_goes_through_all_commands(tmp_path, study, capsys):
+    served, rehearsal, table = (tmp_path / name for name in ("served", "rehearsal", "table"))
+    moving = film(tmp_path / "film.mp4")
+    assert main(["study", "check", str(study)]) == 0, capsys.readouterr().out
+    rehearse = ["study", "rehearse", str(study), "--people", "4", "--dropouts", "0", "--per-minute", "30"]
+    assert main([*rehearse, "--film", str(moving), "--out", str(rehearsal)]) == 0, capsys.readouterr().out
+    assert (rehearsal / "analysis" / "report.html").is_file()
+    serve = [
+        "study",
+        "serve",
+        str(study),
+        "--out",
+        str(served),
+        "--film",
+        str(moving),
+        "--port",
+        "0",
+        "--no-open",
+    ]
+    start_once([sys.executable, "-m", "experiments.cli.main", *serve])
+    gone = asyncio.run(take_part(study, served, moving, 4))
+    assert [(one.outcome, one.faults) for one in gone] == [("finished", [])] * 4
+    names = [str(study), str(served)]
+    assert main(["study", "collect", *names, "--out", str(table)]) == 0
+    assert main(["study", "analyze", str(table), "--exclude", str(study)]) == 0, capsys.readouterr().err
+    assert main(["study", "export", *names, "--out", str(tmp_path / "export")]) == 0
+    assert main(["study", "pay", *names]) == 0
+    assert "30.00 USD are owed in 4 of 4 payments" in capsys.readouterr().out
+    paid = ["--paid", "p00001-reward", "--reference", "receipt", "--rehearsal", str(rehearsal)]
+    assert main(["study", "pay", *names, *paid]) == 0
