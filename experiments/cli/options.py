@@ -113,8 +113,8 @@ def add_call_limit(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         action=_CallLimit,
         metavar="S",
-        help="time limit in seconds for one call of a custom participant, condition or planner; a trial that exceeds it "
-        f"ends with an error (default: {CALL_LIMIT}, else no limit)",
+        help="time limit in seconds for one call of a custom participant, condition or planner; trials that exceed it "
+        f"end with an error (default: {CALL_LIMIT}, else no limit)",
     )
 
 
