@@ -93,8 +93,10 @@ def with_names(story: str, catalogue: Catalogue) -> str:
     `{bins}` and `{categories}` are lists of labels within a sentence ("dish bin, toy box"). `{Bins}` and
     `{Categories}` list the labels themselves ("Dish bin, Toy box"). `{count}` is the number of bins.
     """
-    named = {"bins": catalogue.receptacles, "categories": catalogue.categories}
-    labels = {name: [entry.label for entry in entries.values()] for name, entries in named.items()}
+    labels = {
+        "bins": [receptacle.label for receptacle in catalogue.receptacles.values()],
+        "categories": [category.label for category in catalogue.categories.values()],
+    }
     inside = {name: ", ".join(map(in_sentence, found)) for name, found in labels.items()}
     plain = {name.capitalize(): ", ".join(found) for name, found in labels.items()}
     return filled(story, count=len(catalogue.receptacles), **inside, **plain)
