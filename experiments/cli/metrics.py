@@ -94,7 +94,7 @@ def _measured(path: Path) -> Mapping[str, Any]:
         trial = read_trial(run)
     if not trial.as_measured:
         print(
-            f"mjsim: {path}: metrics.json is missing or differs from these metrics, which follow from the log",
+            f"mjsim: {path}: metrics.json differs from these metrics of the log, or is missing",
             file=sys.stderr,
         )
     return trial.row

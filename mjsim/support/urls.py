@@ -3,8 +3,8 @@
 import re
 from urllib.parse import SplitResult, urlsplit
 
-# A password extends to the last @. It may contain spaces or slashes, but not both.
-_PASSWORD = re.compile(r"(://[^\s:/@]*):(?:\S*|[^\n/,;]*)@")
+# A password extends to the last @. It may contain spaces or slashes, but not both. Advice names it PASSWORD.
+_PASSWORD = re.compile(r"(://[^\s:/@]*):(?!PASSWORD@)(?:\S*|[^\n/,;]*)@")
 _PARAMETER = re.compile(r"([?&][^\s=&]*(?:password|passwd|secret|token|key)[^\s=&]*=)[^\s&]+", re.IGNORECASE)
 
 

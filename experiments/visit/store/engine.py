@@ -231,13 +231,16 @@ class Database:
 
 
 def _parsed(url: str) -> URL:
+    shown = redacted(url) if "://" in url else "text without ://"
     try:
         parsed = make_url(url)
+        if "@" in (parsed.host or ""):
+            raise StoreError("The password in the database URL contains @: write %40 instead.")
         return parsed.set(drivername=DRIVERS[parsed.get_backend_name()])
     except (ArgumentError, KeyError, NoSuchModuleError, ValueError):  # the cause may contain the password
         raise StoreError(
-            f"{redacted(url)!r} is not a database URL. Use sqlite:///FILE, "
-            "mysql://USER:PASSWORD@HOST/NAME or postgresql://USER:PASSWORD@HOST/NAME."
+            f"{shown!r} is not a database URL. Use sqlite:///FILE, mysql://USER:PASSWORD@HOST/NAME or "
+            "postgresql://USER:PASSWORD@HOST/NAME."
         ) from None
 
 

@@ -57,7 +57,7 @@ def test_metrics_that_say_something_else_are_named(run, tmp_path, capsys):
     write_json(folder / records.METRICS, {**read_json(run / records.METRICS), "nd_feasible": 0.99})
     assert main(["metrics", str(folder)]) == 0
     printed = capsys.readouterr()
-    assert "metrics.json differs from these metrics" in printed.err
+    assert "metrics.json differs from these metrics of the log" in printed.err
     assert "0.99" not in printed.out
 
 

@@ -28,7 +28,7 @@ def test_passwords_are_hidden(text):
         "https://play.example.org:8443/",
         "http://[::1]:80/ or mail me@x.org",
         "postgresql://ada@host/x",
-        "a:b@c",
+        "mysql://USER:PASSWORD@HOST",
     ],
 )
 def test_all_else_stays(text):

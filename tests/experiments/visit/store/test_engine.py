@@ -224,7 +224,9 @@ async def test_tables_of_another_program_are_left_alone(url):
     ("url", "message"),
     [
         ("oracle://here", "'oracle://here' is not a database URL"),
-        ("study.db", "is not a database URL"),
+        ("study.db", "is not a database URL. Use sqlite:///FILE, mysql://USER:PASSWORD@HOST/NAME"),
+        ("me:secret@here/study", "'text without ://' is not a database URL"),
+        ("postgresql://me:se@secret@127.0.0.1:9/study", "contains @: write %40 instead"),
         ("postgresql://me:secret@[::1/study", r"me:\*\*\*@\[::1/study' is not a database URL"),
         ("mysql://me:secret@here:many/study", "is not a database URL"),
         ("sqlite://", "name a file"),

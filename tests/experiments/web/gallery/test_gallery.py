@@ -69,7 +69,6 @@ def test_a_home_that_cannot_be_used_leaves_the_others(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("sources", "says"),
     [
-        ([], "gallery needs houses"),
         (["nowhere"], "nowhere"),
         (["generated:5:5"], "a range's end is not included"),
         (["generated:x"], "names no house"),
