@@ -111,13 +111,13 @@ def _notes(reasons: Counter[str], out: Path) -> Iterable[str]:
 
 
 def check_names(trials: Sequence[TrialConfig]) -> None:
-    """Raise `ConfigError` if the participant, assistance, planner or behaviour of a trial is unknown."""
+    """Raise an error that names the setting if a participant, condition, planner or behaviour is unknown."""
     for key, check in NAMES.items():
         for name in sorted({str(getattr(trial, key)) for trial in trials}):
             try:
                 check(name)
             except (ConfigError, HudError, PlannerError) as error:
-                raise ConfigError(f"{key}: {error}") from error
+                raise type(error)(f"{key}: {error}") from error
     for trial in {(t.user, t.behaviour): t for t in trials}.values():
         draw_behaviour(trial)
 

@@ -178,7 +178,7 @@ def test_nothing_of_who_came_by_http_is_in_an_export(tmp_path):
     folder, addresses = tmp_path / "served", []
     folder.mkdir()
 
-    async def note(_, url):
+    async def note(_, url, *__):
         addresses.append(url)
 
     pool = WorkerPool(study.cells[0].trial(0).house)
