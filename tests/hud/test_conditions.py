@@ -223,6 +223,13 @@ def test_labels_inside_a_sentence(label, inside):
     assert in_sentence(label) == inside
 
 
+def test_a_sentence_that_begins_with_a_label_keeps_its_capital():
+    texts = dataclasses.replace(sample.TEXTS, placed="{Object} is in {receptacle}. {Receptacle}: {object}.")
+    found = message("placed", texts, object="Blue mug", receptacle="Dish bin").text
+    assert found == "Blue mug is in dish bin. Dish bin: blue mug."
+    assert message("placed", texts).text.startswith(texts.object)
+
+
 def test_messages_are_shown_for_three_and_a_half_seconds_and_fade_within_half_a_second():
     """The display time is part of the treatment, and the documentation promises it."""
     assert [fade(t) for t in (0.0, 3.5, 3.625, 3.75, 4.0, 1e9)] == pytest.approx([1, 1, 0.75, 0.5, 0, 0])

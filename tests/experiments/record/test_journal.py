@@ -3,6 +3,7 @@
 import os
 import resource
 import signal
+import stat
 import zlib
 
 import msgspec
@@ -184,3 +185,8 @@ def test_a_journal_of_another_version_is_refused_in_one_line(tmp_path, content):
         with pytest.raises(RecordError, match=r"^[^\n]*is a journal of another version of mjsim[^\n]*$"):
             opened(path)
     assert path.read_bytes() == content
+
+
+def test_only_its_user_may_read_a_journal(tmp_path):
+    with Journal(tmp_path / "journal.bin"):
+        assert stat.S_IMODE((tmp_path / "journal.bin").stat().st_mode) == 0o600

@@ -99,6 +99,12 @@ def test_objects_have_their_places_rooms_and_bins_of_the_moment(board, start, ho
     assert board.view(start).objects == before
 
 
+def test_the_view_is_that_of_the_person_who_stands_there(board, start):
+    view = board.view(start, capacity=1)
+    assert (view.position, view.eye) == (tuple(start.position), tuple(start.eye))
+    assert (view.heading, view.clock, view.capacity, view.hands) == (0.7, 0.0, 1, (None, None))
+
+
 def test_the_goal_is_the_object_or_the_bin(board, start, house, episode):
     name = episode.objects[2].name
     assert board.goal(start, Visit(PICK, name)) == tuple(start.object_positions[2])

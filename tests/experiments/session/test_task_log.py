@@ -1,13 +1,18 @@
 """Plans that are not shown are made in a thread; the record is the same."""
 
 import contextlib
+import math
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from experiments.record.records import EventLog
+from experiments.session.task_log import TaskLog, reach_bound
 from experiments.trials.setup import prepare_session, prepared_planner, regret_evaluator, solver_source
 from experiments.trials.trial_config import TrialConfig
 from mjsim.house.scene.scene import compose
+from planner.plan import Visit, VisitKind
 from planner.service import Planner
 
 
@@ -28,3 +33,47 @@ def test_a_run_is_the_same_whether_plans_are_made_in_a_thread_or_inline(house, a
         runs.append((log.events, recorded["log_hash"].tolist(), recorded["state_hash"].tolist()))
     assert runs[0] == runs[1]
     assert sum(event["event"] == "plan" for event in runs[0][0]) > 1, "there was no deviation"
+
+
+PICK, PLACE = VisitKind.PICK, VisitKind.PLACE
+TARGETS = {"cup": "rack", "plate": "rack", "duck": "chest"}
+
+
+@pytest.mark.parametrize(
+    ("loose", "carried", "made", "suggested", "expected"),
+    [
+        (3, (), Visit(PICK, "cup"), Visit(PICK, "duck"), (2, 0, False)),
+        (1, ("cup", "plate"), Visit(PLACE, "cup"), Visit(PLACE, "plate"), (1, 1, True)),
+        (1, ("cup", "plate"), Visit(PLACE, "plate"), Visit(PLACE, "plate"), (1, 1, False)),
+        (1, ("cup", "duck"), Visit(PLACE, "duck"), Visit(PLACE, "cup"), (1, 0, False)),
+        (2, ("cup",), Visit(PICK, "plate"), Visit(PLACE, "cup"), (2, 0, False)),
+        (0, ("cup",), Visit(PLACE, "cup"), None, (0, 0, False)),
+    ],
+)
+def test_alternatives_are_what_could_be_done_and_ties_are_of_one_bin(
+    loose, carried, made, suggested, expected
+):
+    """With full hands, nothing can be picked up."""
+    log = TaskLog(None, EventLog(), None, SimpleNamespace(targets=TARGETS), capacity=2, regrets=False)
+    state = SimpleNamespace(carried=carried, loose=dict.fromkeys(range(loose)))
+    found = log._alternatives(state, made, suggested)
+    assert (found["alternatives"], found["tied_alternatives"], found["tied"]) == expected
+
+
+def test_the_bound_of_a_walk_saves_the_reach_on_both_ways_but_the_last():
+    """A bin of 0.4 m by 0.6 m, whose centre is 0.8 m from where one stands: its far corner is 1.14 m away."""
+    bin_ = SimpleNamespace(
+        half_size=np.array([0.2, 0.3, 0.5]),
+        rotation=np.eye(3),
+        center=np.array([0.0, 0.8, 0.5]),
+        approach=np.zeros(2),
+    )
+    house = SimpleNamespace(person=SimpleNamespace(reach=0.9), receptacles={"rack": bin_})
+    episode = SimpleNamespace(
+        objects=[SimpleNamespace(name=name) for name in ("cup", "plate")],
+        targets={"cup": "rack", "plate": "rack"},
+    )
+    place = 0.9 + math.hypot(0.2, 1.1)
+    saved = 2 * (2 * 0.9 + 2 * place) - place
+    assert reach_bound(30.0, house, episode) == pytest.approx(30.0 - saved)
+    assert reach_bound(1.0, house, episode) == 0.0

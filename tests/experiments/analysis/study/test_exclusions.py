@@ -20,7 +20,7 @@ from experiments.analysis.study.table import study_table
 from experiments.cli.main import main
 from experiments.errors import ConfigError, RecordError
 from experiments.trials.design import read_design, read_exclusions
-from experiments.trials.exclusions import BY_NAME, UNFINISHED, ExcludedPerson, Exclusions, Rule
+from experiments.trials.exclusions import BY_NAME, UNFINISHED, ExcludedPerson, Exclusions, Rule, left_out
 from experiments.trials.table import write_tables
 
 SMALL = {(name, objects): 6 for name in ("none", "highlight", "optimal") for objects in (6, 12)}
@@ -96,6 +96,13 @@ def test_an_unusable_file_of_rules_is_refused_by_name(tmp_path, text, message):
     with pytest.raises(ConfigError) as error:
         read_exclusions(path)
     assert message in str(error.value) and str(path) in str(error.value)
+
+
+def test_the_unfinished_are_left_out_although_others_have_no_ending(tmp_path):
+    cell = {"assistance": "none", "objects": 6}
+    rows = [{"participant": "a", **cell}, {"participant": "b", "ended": "time limit", **cell}]
+    assert [person.person for person in left_out(Exclusions(), rows, tmp_path).values()] == ["b"]
+    assert left_out(Exclusions(), rows[:1], tmp_path) == {}, "a table without endings has none to leave out"
 
 
 def test_rules_that_do_not_fit_the_table_are_refused_by_name():

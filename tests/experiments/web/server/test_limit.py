@@ -12,6 +12,7 @@ def test_a_session_takes_the_slot_of_its_page_and_no_page_in_the_queue_is_passed
     assert not limit.hold("newcomer"), "two pages are before it"
     assert limit.ask("third", 60.0) == 1 and limit.ask("second", 60.0) is None
     assert limit.hold("second") and limit.ask("third", 60.0) == 1
+    assert set(limit.held) == {"second"}
 
 
 def test_a_slot_that_no_session_takes_goes_to_the_next_page(monkeypatch):
