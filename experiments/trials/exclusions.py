@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from experiments.errors import RecordError
-from experiments.record.metrics import Displays
 from experiments.record.phases import ALL_DELIVERED, is_simulated
 
 Row = Mapping[str, Any]
@@ -19,7 +18,6 @@ Reason = Annotated[str, msgspec.Meta(min_length=1, max_length=200, pattern=r"^[^
 Name = Annotated[str, msgspec.Meta(max_length=200)]
 # Columns that identify a participant, in order of reliability
 IDS = ("participant", "fingerprint", "person_seed")
-FROM_PEOPLE = {*(field.name for field in fields(Displays)), "inattentive"}  # columns that simulations lack
 BY_NAME = "people by name"
 
 
@@ -145,11 +143,14 @@ def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[in
 
 def inapplicable(exclusions: Exclusions, rows: Sequence[Row]) -> tuple[Rule, ...]:
     """Return the rules about measures that are only recorded from people, if all rows are simulated."""
+    from experiments.record.metrics import Displays  # imported here so that commands start fast
+
+    from_people = {"inattentive", *(field.name for field in fields(Displays))}
     simulated = all(is_simulated(row.get("user")) for row in rows)
     return tuple(
         rule
         for rule in exclusions.rules
-        if simulated and rule.column in FROM_PEOPLE and not any(rule.column in row for row in rows)
+        if simulated and rule.column in from_people and not any(rule.column in row for row in rows)
     )
 
 

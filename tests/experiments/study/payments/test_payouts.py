@@ -320,8 +320,8 @@ def test_settings_of_a_platform_are_named_with_their_line(tmp_path):
     for before, after, line, text in (
         ('completed = "C0MPLETE"', 'completed = "a b"', "completed", "completed"),
         ('sites = ["https://site"]', 'sites = ["site; *"]', "sites", "sites"),
-        ('api_url = "https://site"', 'api_url = "http://site"', "[study.recruitment]", "http://site"),
-        ('api_url = "https://site"', 'api_url = "site"', "[study.recruitment]", "'site'"),
+        ('api_url = "https://site"', 'api_url = "http://site"', "api_url", "http://site"),
+        ('api_url = "https://site"', 'api_url = "site"', "api_url", "'site'"),
     ):
         content = STUDY.format(platform="prolific", url="https://site").replace(before, after)
         (tmp_path / "study.toml").write_text(content)
