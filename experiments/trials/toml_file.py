@@ -1,7 +1,6 @@
 """Read TOML files, and describe their faults by line, key, value and choices."""
 
 import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,8 @@ from typing import Any, Self
 from msgspec import inspect
 
 from experiments.errors import ConfigError, shown
-from mjsim.support.files import read_text
+from mjsim.support.files import read_bytes
+from mjsim.support.toml import TomlError, decode_toml
 
 _AT = re.compile(r" - at `(?:key` in `)?\$\.?([^`]*)`$")  # the path in an error message of msgspec
 _UNKNOWN = re.compile(r"unknown field `([^`]+)`")
@@ -33,11 +33,11 @@ class TomlFile:
     def read(cls, path: Path, what: str) -> Self:
         """Read a file. Raises `ConfigError` if it is not TOML. `what` names its content in the message."""
         try:
-            text = read_text(path)
-            return cls(path, text, tomllib.loads(text))
+            content = read_bytes(path)
+            return cls(path, content.decode("utf-8-sig", "replace"), decode_toml(content))
         except OSError as error:
             raise ConfigError(f"cannot read {what} {path}: {error.strerror}") from error
-        except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        except TomlError as error:
             raise ConfigError(f"{path} is not TOML: {error}") from error
 
     def fault(self, error: Exception, table: str = "", kind: Any = None) -> ConfigError:

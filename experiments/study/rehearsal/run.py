@@ -22,6 +22,7 @@ from experiments.visit.phases import phases_of
 from mjsim.support.files import write_text_atomically
 
 SERVED, PLAN, PEOPLE, SERVER_LOG = "served", "plan.json", "people.jsonl", "server.log"
+DATABASE = "study.db"  # database in the folder of the server
 WORKERS = "20"  # maximum number of concurrent trials, which need not run in real time
 END_TIMEOUT = 60.0  # maximum time until the server has stopped, in seconds
 HTTP_TIMEOUT = 120.0  # timeout for HTTP requests, in seconds
@@ -91,22 +92,25 @@ def _keep(settings: RehearsalSettings, out: Path) -> None:
     write_text_atomically(path, text)
 
 
+def _command(study: Study, settings: RehearsalSettings, out: Path, film: Path | None) -> list[str]:
+    """Return the command that serves a rehearsal. It names the database, as the environment may name the real one."""
+    served = (out / SERVED).absolute()
+    command = [sys.executable, "-m", "experiments.cli.main", "study", "serve", str(study.path), "--no-open"]
+    command += ["--out", str(served), "--database", f"sqlite:///{served / DATABASE}", "--port", "0"]
+    command += ["--rehearsal", str(settings.factor), "--trusted-proxy", "127.0.0.1", "--workers", WORKERS]
+    return command if film is None else [*command, "--film", str(film)]
+
+
 @asynccontextmanager
 async def _server(
     study: Study, settings: RehearsalSettings, out: Path, film: Path | None
 ) -> AsyncIterator[str]:
-    command = [sys.executable, "-m", "experiments.cli.main", "study", "serve", str(study.path)]
-    command += ["--out", str(out / SERVED), "--rehearsal", str(settings.factor), "--port", "0", "--no-open"]
-    command += [
-        "--trusted-proxy",
-        "127.0.0.1",
-        "--workers",
-        WORKERS,
-        *(["--film", str(film)] if film else []),
-    ]
     with (out / SERVER_LOG).open("ab") as log:
         process = await asyncio.create_subprocess_exec(
-            *command, stdout=asyncio.subprocess.PIPE, stderr=log, start_new_session=True
+            *_command(study, settings, out, film),
+            stdout=asyncio.subprocess.PIPE,
+            stderr=log,
+            start_new_session=True,
         )  # a separate session, so that the server does not receive Ctrl-C
         try:
             url = (await process.stdout.readline()).decode().strip() if process.stdout else ""

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from check_rehearsal import check
 
-from experiments.cli.main import main
+from experiments.cli.main import main, parser
 from experiments.record.phases import REHEARSED
 from experiments.study.file import read_people_study
 from experiments.study.rehearsal.plan import plan_people
 from experiments.study.rehearsal.report import report
-from experiments.study.rehearsal.run import RehearsalSettings
+from experiments.study.rehearsal.run import RehearsalSettings, rehearse
 from experiments.visit.plan import PHASES
 from experiments.visit.store import Store
 
@@ -122,6 +122,24 @@ def test_a_rehearsal_that_cannot_be_analysed_has_not_passed(tmp_path, study):
     found = asyncio.run(_empty_rehearsal(read_people_study(study), tmp_path))
     assert not found.passed and found.faults[0].startswith("the analysis cannot be computed: ")
     assert json.loads((tmp_path / "rehearsal.json").read_text())["passed"] is False
+
+
+def test_a_rehearsal_is_never_written_to_the_real_database(tmp_path, study, monkeypatch):
+    """Otherwise simulated people would take the places of participants."""
+    monkeypatch.setenv("MJSIM_STUDY_DATABASE", "postgresql://real@example.org/study")
+    started = []
+
+    async def noted(*command, **_):
+        started.extend(command)
+        raise ProcessLookupError
+
+    monkeypatch.setattr(asyncio, "create_subprocess_exec", noted)
+    read = read_people_study(study)
+    settings = RehearsalSettings(read.sha256, people=1, seed=0, per_minute=2.0, dropouts=0.2, factor=20.0)
+    with pytest.raises(ProcessLookupError):
+        asyncio.run(rehearse(read, settings, tmp_path / "out", None, lambda _: None))
+    arguments = parser("study").parse_args(started[started.index("study") :])
+    assert arguments.database == f"sqlite:///{tmp_path}/out/served/study.db"
 
 
 def test_another_study_or_folder_is_not_opened_as_an_empty_study(tmp_path, study, capsys):
