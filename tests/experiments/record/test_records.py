@@ -177,6 +177,20 @@ def test_an_event_that_was_written_wrongly_is_found_with_its_line_and_step():
     assert found.message.startswith("line 1: events.jsonl has an invalid event")
 
 
+def test_a_changed_line_of_the_log_is_named_with_the_step_in_which_it_was_written():
+    writer = new_writer()
+    writer.log.append(0.0, "start", episode_sha256="", objects=2, order=["b", "a"])
+    for step in range(6):
+        writer.append(observation(step * 0.04), HealthSample(), step, Steps(Move()))
+        if step == 3:
+            writer.log.append(0.16, "picked", object="b", receptacle=None)
+    record = writer.record()
+    changed = dataclasses.replace(record, log=record.log.replace(b'"object": "b"', b'"object": "c"'))
+    assert changed.log != record.log
+    [found] = [m for m in damage(changed) if "not as written" in m.message]
+    assert (found.step, found.message) == (3, "events.jsonl is not as written, at line 2")
+
+
 def test_files_that_are_missing_changed_or_added_after_a_run_are_named(tmp_path):
     fill(tmp_path)
     write_checksums(tmp_path, (EPISODE, EVENTS))
