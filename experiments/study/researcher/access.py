@@ -15,7 +15,7 @@ from experiments.web.server.guards import Rate
 COOKIE = "mjsim-login"
 LASTS = datetime.timedelta(hours=12)
 # Maximum number of login attempts per address with one name and with any name, and the period in seconds. The attempts
-# of other addresses do not count, so that nobody can lock the account of another researcher.
+# of other addresses do not count, so that no one can lock out a researcher.
 ATTEMPTS, ALL_ATTEMPTS = (10, 300.0), (40, 300.0)
 CHECKS = 2  # maximum number of concurrent password checks, each of which needs 64 MiB
 ORDER: tuple[Role, ...] = ("viewer", "assistant", "owner")  # roles in order of increasing permissions
