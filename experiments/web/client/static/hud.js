@@ -108,7 +108,7 @@ export class Hud {
     mark.classList.toggle("away", !at);
     const [x, y] = at ?? [0.5, 0.9];
     mark.style.setProperty("--x", `${Math.min(Math.max(x, 0), 1)}`);
-    mark.style.top = `clamp(4rem, ${100 * y}%, 95%)`;
+    mark.style.setProperty("--y", `${y}`);
   }
 
   /** Returns true if a point of the page is on the object in reach. @param {number} x px @param {number} y px */

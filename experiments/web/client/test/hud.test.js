@@ -65,7 +65,7 @@ describe("the display", () => {
     hud.expect(moment({ reach: { object: "Mug", receptacle: null, at: [0.5, 0.25], instance: "object_00", place: [1, 2, 0] } }));
     expect(hud.reach).toBe(false); // its frame is not on show yet
     hud.reached(1);
-    expect([hud.reach, part("reach").textContent, part("reach").style.top]).toEqual([true, "E Pick up Mug", "clamp(4rem, 25%, 95%)"]);
+    expect([hud.reach, part("reach").textContent, part("reach").style.getPropertyValue("--y")]).toEqual([true, "E Pick up Mug", "0.25"]);
     hud.expect(moment({ step: 2, reach: { object: "Mug", receptacle: "Dish bin", at: null, instance: "object_00", place: [3, 4, 1] } }));
     hud.reached(2);
     expect([part("reach").textContent, part("reach").classList.contains("away")]).toEqual(["E Put Mug into Dish bin", true]);
