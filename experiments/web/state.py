@@ -167,7 +167,8 @@ class Hud(WireMessage, frozen=True):
 class Reach(msgspec.Struct, frozen=True):
     """The object that the action key would pick up or place, and the receptacle in which it would be placed.
 
-    An object that has not been in the picture yet is not reported, because its label would reveal it.
+    In a condition without markers, an object that has not been in the picture yet is not reported, because its
+    label would reveal it.
     `instance` is the object's instance name. `place` is the position of the object or receptacle in metres.
     `at` is this position in the view, as fractions of its width and height, or None if it is not visible.
     """

@@ -135,9 +135,12 @@ class BrowserViewer(Viewer):
         rooms = live.shown.rooms
         clock = None if state.clock is None else float(math.floor(state.clock))
         room = rooms.label(rooms.room_at(seen.position))
-        return Moment(step, clock, room, self._reach(live, seen), state.pointer, state.minimap)
+        return Moment(
+            step, clock, room, self._reach(live, seen, bool(state.markers)), state.pointer, state.minimap
+        )
 
-    def _reach(self, live: LiveSession, seen: Observation) -> Reach | None:
+    def _reach(self, live: LiveSession, seen: Observation, marked: bool) -> Reach | None:
+        """Return the target of the action key. `marked` is True if markers show where objects are."""
         if (camera := self.camera(live.world)) is None:
             return None
         self._notice(live, seen, camera)
@@ -148,7 +151,7 @@ class BrowserViewer(Viewer):
         model = next(item.model for item in episode.objects if item.name == result.object)
         place: Any
         if isinstance(result.action, Pick):
-            if result.object not in self._noticed:
+            if not marked and result.object not in self._noticed:
                 return None
             receptacle, place = None, seen.object_positions[seen.object_names.index(result.object)]
         else:

@@ -145,11 +145,12 @@ def test_a_moment_names_the_room_and_what_the_action_key_would_take(shown):
     shown.viewer._noticed.clear()
     above = np.array([item.position[0] - 0.3, item.position[1], 1.6])
     away, towards = (dataclasses.replace(seen, eye=above, heading=0.0, pitch=pitch) for pitch in (1.2, -1.2))
-    assert shown.viewer._reach(live, away) is None, (
+    assert shown.viewer._reach(live, away, False) is None, (
         "its label would reveal an object that was not in the picture"
     )
-    assert shown.viewer._reach(live, towards) is not None
-    reach = shown.viewer._reach(live, away)
+    assert shown.viewer._reach(live, away, True) is not None, "a marker shows where it is"
+    assert shown.viewer._reach(live, towards, False) is not None
+    reach = shown.viewer._reach(live, away, False)
     assert reach.object == live.house.catalogue.objects[item.model].label and reach.receptacle is None
     assert reach.at is None or all(0.0 <= share <= 1.0 for share in reach.at)
     assert reach.instance == item.name
