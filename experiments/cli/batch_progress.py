@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import add_call_limit
+from experiments.cli.server import number
 from experiments.errors import ConfigError
 from experiments.trials.design import Design, counted
 from experiments.trials.shards import Shard
@@ -25,7 +26,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     add_call_limit(parser)
     parser.add_argument(
         "--workers",
-        type=int,
+        type=number(0, 100_000),
         metavar="N",
         help=f"number of trials at a time (default: one per core, here {os.cpu_count()}; all cores of a Ray cluster)",
     )

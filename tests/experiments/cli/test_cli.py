@@ -301,6 +301,7 @@ numpy.ones(1) / numpy.zeros(1)"""
         (["study", "serve", "s.toml", "--out", "x", "--researcher-host", " "], "is empty; name an address"),
         ([*PLAY, "--host", ""], "an argument is empty"),
         (["metrics", ""], "an argument is empty"),
+        (["batch", "--out", "x", "--workers", "9" * 14], "is not a number from 0 to 100000"),
         (["replay", "run", "--assistance="], "an argument is empty"),
         ([*PLAY, "--minimum", "story=1e99"], "1e+99 s is too long; give at most 86400 s"),
     ],
