@@ -194,17 +194,15 @@ def test_a_changed_line_of_the_log_is_named_with_the_step_in_which_it_was_writte
 def test_files_that_are_missing_changed_or_added_after_a_run_are_named(tmp_path):
     fill(tmp_path)
     write_checksums(tmp_path, (EPISODE, EVENTS))
-    record = new_writer()
-    record.append(observation(), HealthSample(), 0, Steps(Move()))
     (tmp_path / "notes.txt").write_text("of a user's own")
-    found = {m.file: m.message for m in checksum_mismatches(tmp_path, record.record())}
+    found = {m.file: m.message for m in checksum_mismatches(tmp_path)}
     assert set(found) == {METRICS} and "was not written with the run" in found[METRICS]
     (tmp_path / EPISODE).write_text("{ }")
     (tmp_path / EVENTS).unlink()
-    found = {m.file: m.message for m in checksum_mismatches(tmp_path, record.record())}
+    found = {m.file: m.message for m in checksum_mismatches(tmp_path)}
     assert "is not the file that was written" in found[EPISODE] and "is missing" in found[EVENTS]
     (tmp_path / CHECKSUMS).unlink()
-    assert [m.file for m in checksum_mismatches(tmp_path, record.record())] == [CHECKSUMS]
+    assert [m.file for m in checksum_mismatches(tmp_path)] == [CHECKSUMS]
 
 
 def test_a_journal_without_control_steps_is_an_empty_record():
