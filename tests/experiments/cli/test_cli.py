@@ -20,10 +20,10 @@ ROOT = Path(__file__).parents[3]
 PLAY = ["play", "--no-open", "--port", "0"]
 DESIGN = str(ROOT / "docs" / "designs" / "two_houses.toml")
 DEFAULTS = {  # some that the help of a command names
-    "run": ["objects, 1 to --points (default: 6)", "(default: optimal)", "size, px (default: 960x540)"],
+    "run": ["objects, 1 to --points (default: 6)", "(default: optimal)", "size in pixels (default: 960x540)"],
     "batch": ["(default: 0:10)", "(default: none,highlight,optimal)", "(default: apartment)"],
     "play": ["(default: story,flythrough,training,task)"],
-    "replay": ["(default: 0.0)", "(default: first-person)", "a free camera, m (default: circles"],
+    "replay": ["seconds (default: 0)", "(default: first-person)", "a free camera, in metres (default: circles"],
 }
 
 
