@@ -35,9 +35,7 @@ def check_study(path: Path, *, recruits: bool = False) -> Study | None:
     if "study" not in file.content:
         return None
     study = read_people_study(path)
-    if (
-        importlib.util.find_spec("httpx") is None
-    ):  # simulations need no extra, without which phases cannot be made
+    if importlib.util.find_spec("httpx") is None:  # Phases need the extra `people`, but simulations do not.
         return study
     from experiments.study.plan import plan_of
 

@@ -10,12 +10,10 @@ from msgspec import inspect
 
 from experiments.errors import ConfigError, shown
 from mjsim.support.files import read_bytes
-from mjsim.support.toml import TomlError, decode_toml
+from mjsim.support.toml import TomlError, decode_toml, joined_key, line_of
 
 _AT = re.compile(r" - at `(?:key` in `)?\$\.?([^`]*)`$")  # the path in an error message of msgspec
 _UNKNOWN = re.compile(r"unknown field `([^`]+)`")
-_HEADER = re.compile(r"\s*\[(\[?)\s*([\w.\"-]+)\s*\]")
-_KEY = re.compile(r"\s*([\w.\"-]+)\s*=")
 _WORD = re.compile(r"\w+(?:[.-]\w+)*")
 _CELL = re.compile(r"^cells\[\d+\]")
 _MISSING = object()
@@ -50,13 +48,13 @@ class TomlFile:
         """
         message, key = str(error), table
         if found := _AT.search(message):
-            key, message = _joined(table, found[1]), message[: found.start()]
+            key, message = joined_key(table, found[1]), message[: found.start()]
         if unknown := _UNKNOWN.search(message):
-            key = _joined(key, unknown[1])
+            key = joined_key(key, unknown[1])
         elif table and message.startswith(f"{table}."):
             key = message.partition(" ")[0]
         elif isinstance(values := self.value(key), Mapping):
-            key = _joined(key, _named(values, message))
+            key = joined_key(key, _named(values, message))
         line, value, told = self.line(key), self.value(key), _in_a_sentence(message, kind, key)
         where = f"{self.path}, line {line}" if line else str(self.path)
         if value is _MISSING or isinstance(value, Mapping):
@@ -78,30 +76,7 @@ class TomlFile:
 
     def line(self, key: str) -> int | None:
         """Return the line number of a key, or of the innermost table that should contain the key."""
-        lines = dict(reversed(list(self._lines())))
-        while key:
-            if found := lines.get(key) or lines.get(_CELL.sub("all_cells", key) if "." in key else key):
-                return found
-            key = key[: max(key.rfind("."), key.rfind("["), 0)]
-        return None
-
-    def _lines(self) -> Iterator[tuple[str, int]]:
-        table, counts = "", dict[str, int]()
-        for number, line in enumerate(self.text.splitlines(), 1):
-            if header := _HEADER.match(line):
-                table = header[2].replace('"', "")
-                if header[1]:
-                    counts[table] = counts.get(table, -1) + 1
-                for name, index in counts.items():
-                    if f"{table}.".startswith(f"{name}."):
-                        table = f"{name}[{index}]{table[len(name) :]}"
-                yield table, number
-            elif key := _KEY.match(line):
-                yield _joined(table, key[1].replace('"', "")), number
-
-
-def _joined(table: str, key: str) -> str:
-    return f"{table}{'' if key.startswith('[') else '.'}{key}".strip(".") if key else table
+        return line_of(self.text, key, *([_CELL.sub("all_cells", key)] if "." in key else []))
 
 
 def _named(values: Mapping[str, Any], message: str) -> str:

@@ -1,7 +1,8 @@
-"""Read TOML files."""
+"""Read TOML files, and find the lines of their keys."""
 
 import re
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,9 @@ from mjsim.support.files import read_bytes
 MAX_DOTS = 100
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_DOTS + 1}}}")
+_NAME = r"""((?:[\w.-]|"[^"\n]*")+)"""
+_HEADER = re.compile(rf"\s*\[(\[?)\s*{_NAME}\s*\]")
+_KEY = re.compile(rf"\s*{_NAME}\s*=")
 
 
 class TomlError(ValueError):
@@ -40,3 +44,36 @@ def parse_toml(text: str) -> dict[str, Any]:
         raise TomlError("tables or lists are nested too deep") from None
     except ValueError as error:  # includes numbers with too many digits
         raise TomlError(str(error)) from error
+
+
+def line_of(text: str, *keys: str) -> int | None:
+    """Return the line number of the first of some keys, or of the innermost table that should contain one of them.
+
+    Keys are written like `study.pay.reward` or `cells[0].objects`. Return None if no table of the keys exists.
+    """
+    lines = dict(reversed(list(_key_lines(text))))
+    while any(keys):
+        if found := [lines[key] for key in keys if key in lines]:
+            return found[0]
+        keys = tuple(key[: max(key.rfind("."), key.rfind("["), 0)] for key in keys)
+    return None
+
+
+def joined_key(table: str, key: str) -> str:
+    """Return the full name of a key in a table. If the key is empty, return the name of the table."""
+    return f"{table}{'' if key.startswith('[') else '.'}{key}".strip(".") if key else table
+
+
+def _key_lines(text: str) -> Iterator[tuple[str, int]]:
+    table, counts = "", dict[str, int]()
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := _HEADER.match(line):
+            table = header[2].replace('"', "")
+            if header[1]:
+                counts[table] = counts.get(table, -1) + 1
+            for name, index in counts.items():
+                if f"{table}.".startswith(f"{name}."):
+                    table = f"{name}[{index}]{table[len(name) :]}"
+            yield table, number
+        elif key := _KEY.match(line):
+            yield joined_key(table, key[1].replace('"', "")), number

@@ -9,10 +9,9 @@ import msgspec
 
 from experiments.errors import ConfigError
 from experiments.visit.texts.items import Item
-from mjsim.support.toml import read_toml
+from mjsim.support.toml import line_of, read_toml
 
 FOLDER = Path(__file__).parents[2] / "texts"
-_HEADER = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]")
 _ITEM = re.compile(r"`\$\.item\[(\d+)\](?:\.(\w+))?")
 _PLACE = re.compile(r"\{(\w+)\}")
 
@@ -127,11 +126,11 @@ def _section(
     names = [item.name for item in form.item]
     for number, item in enumerate(form.item):
         if item.name in names[:number]:
-            where = _at(path, name, "name", number)
+            where = _at(path, name, f"item[{number}]", "name")
             raise ConfigError(f"{where}: [{name}] has two items with the name {item.name!r}; rename one")
         points = range(1, len(form.scale or ()) + 1)
         if item.kind == "scale" and item.right is not None and item.right not in points:
-            where = _at(path, name, "right", number)
+            where = _at(path, name, f"item[{number}]", "right")
             raise ConfigError(
                 f"{where}: [{name}] item {item.name}: right is {item.right!r}, no point of the scale"
             )
@@ -148,25 +147,15 @@ def _item_fault(path: Path | None, section: str, table: dict[str, Any], message:
         return f"{_at(path, section)}: [{section}]: {message}"
     number, key = int(found[1]), found[2] or ""
     value = f"{key} is {table['item'][number].get(key)!r}; " if key else ""
-    return f"{_at(path, section, key, number)}: [{section}] item {number + 1}: {value}{message}"
+    return f"{_at(path, section, f'item[{number}]', key)}: [{section}] item {number + 1}: {value}{message}"
 
 
-def _at(path: Path | None, section: str, key: str = "", item: int | None = None) -> str:
-    """Return the path of a study's texts with the line of a section, of one of its items, or of a key in these."""
+def _at(path: Path | None, *key: str) -> str:
+    """Return the path of a study's texts with the line of a key, which is given by its parts."""
     if path is None:
         return "texts"
-    wanted, header, best, items = (section if item is None else f"{section}.item"), "", 0, -1
-    for number, line in enumerate(path.read_text("utf-8", "replace").splitlines(), 1):
-        if found := _HEADER.match(line):
-            header = found[1]
-            items += header == f"{section}.item"
-        elif header != wanted or not key or not re.match(rf"\s*{re.escape(key)}\s*=", line):
-            continue
-        if header == wanted and (item is None or items == item):
-            best = number
-            if found is None:
-                break
-    return f"{path}, line {best}" if best else str(path)
+    line = line_of(path.read_text("utf-8", "replace"), ".".join(filter(None, key)))
+    return f"{path}, line {line}" if line else str(path)
 
 
 def _filled(text: str, values: Mapping[str, str], english: str, place: tuple[Path | None, str, str]) -> str:

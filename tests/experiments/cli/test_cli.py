@@ -23,7 +23,11 @@ DEFAULTS = {  # some that the help of a command names
     "run": ["objects, 1 to --points (default: 6)", "(default: optimal)", "size in pixels (default: 960x540)"],
     "batch": ["(default: 0:10)", "(default: none,highlight,optimal)", "(default: apartment)"],
     "play": ["(default: story,flythrough,training,task)"],
-    "replay": ["seconds (default: 0)", "(default: first-person)", "a free camera, in metres (default: circles"],
+    "replay": [
+        "seconds (default: 0)",
+        "(default: first-person)",
+        "a free camera, in metres (default: circles",
+    ],
 }
 
 
