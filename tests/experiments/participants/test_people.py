@@ -109,7 +109,7 @@ def test_a_design_says_who_takes_part(tmp_path):
     assert draw_person(usual) == PersonParameters()
     assert other.person == Distributions.of({"walking_speed": {"normal": [1.2, 0.2]}})
     file.write_text(file.read_text().replace("walking_speed", "walking_pace"))
-    with pytest.raises(ConfigError, match=r"no 'walking_pace'.*cells\[1\]"):
+    with pytest.raises(ConfigError, match=r"line 8: cells\[1\].person: a person has no 'walking_pace'"):
         read_design(file)
 
 
