@@ -16,6 +16,7 @@ from check_rehearsal import check
 
 from experiments.cli.main import main, parser
 from experiments.record.phases import REHEARSED
+from experiments.session.video import VideoWriter
 from experiments.study.file import read_people_study
 from experiments.study.rehearsal.plan import plan_people
 from experiments.study.rehearsal.report import report
@@ -151,19 +152,11 @@ def test_another_study_or_folder_is_not_opened_as_an_empty_study(tmp_path, study
     for words in (["pay", "--dry-run"], ["hosts"], ["collect", "--out", str(tmp_path / "table")]):
         assert main(["study", words[0], str(other), str(served), *words[1:]]) == 2, words
         assert "has no study 'other' (it has: small)" in capsys.readouterr().err
-    words = [
-        "study",
-        "serve",
-        str(other),
-        "--out",
-        str(served),
-        "--port",
-        "0",
-        "--no-open",
-        "--film",
-        str(study),
-    ]
-    assert main(words) == 2, "a folder holds one study"
+    film = tmp_path / "film.mp4"
+    with VideoWriter(film, width=64, height=48) as writer:
+        writer.write(np.zeros((48, 64, 3), np.uint8))
+    words = ["serve", str(other), "--out", str(served), "--port", "0", "--no-open", "--film", str(film)]
+    assert main(["study", *words]) == 2, "a folder holds one study"
     assert "it has: small" in capsys.readouterr().err
     assert main(["study", "researcher", "list", str(study), str(tmp_path / "typo")]) == 2
     (tmp_path / "empty.db").touch()

@@ -188,10 +188,10 @@ def test_files_are_cached_and_pages_are_not(tmp_path, pool):
         tag = client.get("/static/play.js").headers["etag"]
         assert client.get("/static/play.js", headers={"If-None-Match": tag}).status_code == 304
         text = client.get(link).text
-        (address,) = re.findall(r'<script type="module" src="(/static/[0-9a-f]{16}/study/form.js)">', text)
+        (address,) = re.findall(r'<script type="module" src="(/static/[0-9a-f]{16}/study/film.js)">', text)
         answer = client.get(address)
         assert answer.status_code == 200 and "immutable" in answer.headers["cache-control"]
-        assert f'href="{address.replace("study/form.js", "style.css")}"' in text
+        assert f'href="{address.replace("study/film.js", "style.css")}"' in text
 
 
 PROXY, SPOOF = "203.0.113.9", "198.51.100."
