@@ -216,11 +216,13 @@ class Comprehension(FormPhase):
         read = super().read(visitor, sent)
         if isinstance(read, Again):
             return dataclasses.replace(read, counts=False)
-        if not any(item.is_wrong(read.answers.get(item.name)) for item in self.items):
-            return read
         again = Again(self.texts["wrong"], {"form": self._form(None, read.answers)})
         if sent.get("attempt", str(visitor.attempts)) != str(visitor.attempts):
-            return dataclasses.replace(again, counts=False)  # this page was sent before
+            return dataclasses.replace(
+                again, counts=False
+            )  # otherwise, an old page would give unlimited attempts
+        if not any(item.is_wrong(read.answers.get(item.name)) for item in self.items):
+            return read
         limit = self._plan.limits.attempts
         last = limit is not None and visitor.attempts + 1 >= limit
         return Done(read.answers, "screened_out") if last else again

@@ -74,7 +74,7 @@ def test_a_shard_depends_on_the_design_only_and_mixes_its_cells():
 
 
 @pytest.mark.parametrize(
-    "text", ["0/40", "41/40", "3/0", "0/0", "a/b", "3", "3/", "-1/4", "1/4/5", "1.5/4", "٣/٤", ""]
+    "text", ["0/40", "41/40", "3/0", "0/0", "a/b", "3", "3/", "-1/4", "1/4/5", "1.5/4", "٣/٤"]
 )
 def test_what_is_not_a_shard_is_refused_with_a_hint(text, capsys):
     with pytest.raises(ConfigError, match="is not a shard K/N"):
