@@ -175,8 +175,8 @@ class LayeredRenderer(OffScreenRenderer):
     """An off-screen renderer that is several times as fast as `Renderer` while the camera is stationary.
 
     It caches an image of the stationary geoms, and draws moving geoms and markers over this image where they
-    are nearer. Moving geoms behind other geoms show faintly, like x-ray markers. The cache is not used with
-    shadow maps, reflections or multisampling, or while a translucent geom moves.
+    are nearer. Moving geoms behind other geoms show faintly, like x-ray markers, which have no lines around them
+    here. The cache is not used with shadow maps, reflections or multisampling, or while a translucent geom moves.
     """
 
     def __init__(self, model: Any, **options: Any) -> None:

@@ -34,13 +34,13 @@ def test_every_frame_is_on_the_sheet_in_its_row_and_column():
         for row, name in enumerate(conditions)
         for column, key in enumerate(SITUATIONS)
     }
-    frames = {which: np.full((480, 640, 3), colour, np.uint8) for which, colour in colours.items()}
+    frames = {which: np.full((540, 960, 3), colour, np.uint8) for which, colour in colours.items()}
     sheet = contact_sheet(conditions, frames, width=160)
     corners = {}
     for which, colour in colours.items():
         rows, columns = np.nonzero((sheet == colour).all(axis=2))
-        assert len(rows) == 160 * 120, which
-        assert (np.ptp(rows), np.ptp(columns)) == (119, 159)
+        assert len(rows) == 160 * 90, which
+        assert (np.ptp(rows), np.ptp(columns)) == (89, 159)
         corners[which] = rows.min(), columns.min()
     for name in conditions:
         lefts = [corners[name, key][1] for key in SITUATIONS]

