@@ -1,12 +1,15 @@
 """The house in an emulated headset (experimental): two pictures, the head looks, controllers walk and press."""
 
 import base64
+import json
 import math
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import experiments
 from mjsim.formats.gltf.export import export_scene
 from tools.drawn_pairs import decoded, sampled_scene, served
 
@@ -47,6 +50,17 @@ PICTURE = """() => new Promise((resolve) => {
   look();
 })"""
 
+GIVE_TEXTS = """(texts) => {
+  const element = document.createElement("script");
+  document.body.append(Object.assign(element, { id: "texts", type: "application/json", textContent: texts }));
+}"""
+
+
+def texts():
+    """All English texts of pages."""
+    tables = tomllib.loads((Path(experiments.__file__).parent / "texts" / "en.toml").read_text("utf-8"))
+    return {name: text for table in tables.values() for name, text in table.items() if isinstance(text, str)}
+
 
 @pytest.fixture
 def page(chromium):
@@ -57,6 +71,7 @@ def page(chromium):
         page = chromium.new_page(viewport={"width": 800, "height": 400})
         page.goto(address)
         page.wait_for_function("window.ready")
+        page.evaluate(GIVE_TEXTS, json.dumps(texts()))
         page.add_script_tag(content=EMULATOR.read_text(encoding="utf-8"))
         yield page
         page.close()
