@@ -252,7 +252,7 @@ def draw(
 def quantiles(
     parameters: Mapping[str, Parameter], described: Distributions, shares: Sequence[float], of: str
 ) -> dict[str, float]:
-    """Return a participant's parameter values by name. Each value is the quantile at its share (0 to 1)."""
+    """Return a participant's parameter values by name. Each share selects the quantile of a distribution."""
     for name in described:
         if name not in parameters:
             has = f"it has {', '.join(parameters)}" if parameters else "it has no parameters"

@@ -41,7 +41,7 @@ def write_report(
 
 
 def analysis_faults(study: Study, table: Path, out: Path, *, shortened: bool = False) -> list[str]:
-    """Analyse a table of simulated participants like that of real ones. Return the reason why this is impossible.
+    """Analyse the table of simulated participants as if they were real. Return an error message if this fails.
 
     Excluded people are ignored, because they are real ones.
 
