@@ -217,7 +217,7 @@ def firefox(profile, screen=None):
             while not (address := re.search(r"BiDi listening on (ws://\S+)", log.read_text())):
                 assert process.poll() is None and time.monotonic() < until, log.read_text()
                 time.sleep(0.1)
-            with connect(f"{address[1]}/session", max_size=None) as socket:
+            with connect(f"{address[1]}/session", max_size=None, ping_interval=None) as socket:
                 yield Firefox(socket, process)
         finally:  # a failed test must not wait for its browser
             process.kill()
