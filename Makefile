@@ -6,7 +6,7 @@ READY  := $(VENV)/.ready
 WORKERS ?= auto
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow coverage check check-client format site wheel-check compatibility constraints assets pictures data-dictionary client-protocol clean
+.PHONY: help demo test test-slow check check-client format site wheel-check compatibility constraints assets pictures data-dictionary client-protocol clean
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -16,14 +16,11 @@ demo: $(READY) ## Set up, simulate an assisted clean-up into runs/demo, then fil
 	@echo "Look at runs/demo/topdown.png while the film is made."
 	$(BIN)/mjsim replay runs/demo --video runs/demo.mp4 --force
 
-test: $(READY) ## Set up, then run all tests except the slow ones
-	$(BIN)/python -m pytest -n $(WORKERS)
+test: $(READY) ## Set up, then run the tests but for the slow ones; COVERAGE=1 measures what they cover
+	$(BIN)/python -m pytest -n $(WORKERS) $(if $(COVERAGE),--cov --cov-report=term:skip-covered --cov-fail-under=0)
 
-test-slow: $(READY) ## Run the slow tests
-	$(BIN)/python -m pytest -n $(WORKERS) --maxschedchunk=1 -m slow
-
-coverage: $(READY) ## Run all tests, and check how much of the code they run
-	$(BIN)/python -m pytest -n $(WORKERS) --maxschedchunk=1 -m "" --cov --cov-report=term:skip-covered
+test-slow: $(READY) ## Run the slow tests; COVERAGE=1 adds to what `make test` measured, and checks the sum
+	$(BIN)/python -m pytest -n $(WORKERS) --maxschedchunk=1 -m slow $(if $(COVERAGE),--cov --cov-append --cov-report=term:skip-covered)
 
 check: check-client site ## Lint, strict types, import contracts, security, the site
 	$(BIN)/ruff check .
