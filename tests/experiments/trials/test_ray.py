@@ -125,7 +125,8 @@ def test_sigterm_ends_the_batch_with_our_line(tmp_path):
     process.terminate()
     _, said = process.communicate(timeout=60)
     assert process.returncode == 128 + signal.SIGTERM
-    ray_line, our_line = said.splitlines()
+    ray_line, *progress, our_line = said.splitlines()
+    assert all(line.startswith("trials: ") for line in progress)
     assert ray_line.startswith("Ray: 2 cores on 2 machines") and "stopped by SIGTERM" in our_line
     assert len((tmp_path / "out" / "trials.csv").read_text().splitlines()) == len(list(trials.iterdir())) + 1
     assert not list(trials.glob(".*"))
