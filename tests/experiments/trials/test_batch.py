@@ -3,6 +3,7 @@
 import os
 import sys
 
+import pytest
 from user_code import participant
 
 from experiments.trials.batch import run_batch
@@ -21,6 +22,7 @@ def test_one_failing_trial_does_not_stop_the_others(tmp_path, own_module, monkey
     assert any("nothing to go for" in (r.failure or "") for r in reports)
 
 
+@pytest.mark.slow
 def test_a_trial_whose_process_dies_goes_last_and_alone(tmp_path, own_module, monkeypatch):
     """At once and at a resume; what was begun beside it is run as well."""
     own_module(participant("os.kill(os.getpid(), 11)"))

@@ -21,6 +21,7 @@ from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_reader import read_trials
 from hud.errors import ConditionError
 from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.scene import sampling
 from mjsim.values.errors import AssetError, EpisodeError, SamplingError
 from planner.errors import PlannerError
 
@@ -203,7 +204,8 @@ def test_participants_who_are_shown_what_they_need_pass():
     check_trials([brief(user="nearest", assistance="highlight"), brief(user="boltzmann:2"), brief()])
 
 
-def test_a_house_too_small_for_the_points_is_named_before_the_first_trial(small_house):
+def test_a_house_too_small_for_the_points_is_named_before_the_first_trial(small_house, monkeypatch):
+    monkeypatch.setattr(sampling, "PACKINGS", 1)
     trial = brief(house=str(small_house / "catalogue.toml"))
     with pytest.raises(SamplingError, match=r"of 40 points fit.*--points"):
         check_trials([trial])

@@ -53,9 +53,9 @@ def run(house, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def film(house, tmp_path_factory):
-    """5 s of a trial, filmed."""
+    """3 s of a trial, filmed."""
     out = tmp_path_factory.mktemp("replay") / "film"
-    config = TrialConfig(objects=6, assistance="optimal", seed=3, time_limit=5.0)
+    config = TrialConfig(objects=6, assistance="optimal", seed=3, time_limit=3.0)
     run_trial(config, out, film=SMALL, topdown=False, house=house)
     return out
 
@@ -103,6 +103,7 @@ def bad_step(folder, house, **options):
 # A run replays.
 
 
+@pytest.mark.slow
 def test_a_run_replays_in_another_process(run):
     done = subprocess.run(
         [sys.executable, "-m", "experiments.cli.main", "replay", str(run)],
@@ -374,6 +375,7 @@ def test_a_replay_films_the_same_frames(film, house, tmp_path):
     assert report.as_filmed
 
 
+@pytest.mark.slow
 def test_a_replay_shows_the_list_scrolled_as_it_was(house, tmp_path):
     rows, advance = {0: 2, 10: 3, 45: -1, 60: 20}, Session.advance  # scrolled by so many, by control step
     frames = []
@@ -403,8 +405,8 @@ def test_a_replay_shows_the_list_scrolled_as_it_was(house, tmp_path):
 
 @pytest.mark.parametrize("options", [{"assistance": "none"}, {"camera": "top-down"}, {"camera": "free"}])
 def test_another_view_of_the_same_run(film, house, tmp_path, options):
-    report = frames_of(film, house, tmp_path, start=4.0, **options)
-    assert report.first + report.steps == 126
+    report = frames_of(film, house, tmp_path, start=2.0, **options)
+    assert report.first + report.steps == 76
     assert report.as_filmed is False
 
 

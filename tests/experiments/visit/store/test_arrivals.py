@@ -30,5 +30,7 @@ def test_everybody_who_comes_at_once_gets_every_page_and_a_place_of_their_own(tm
         (cell, place) for cell in (0, 1) for place in range(people // 2)
     ]
     assert Counter(one.person_id for one in places) == Counter(one.id for one in known)
-    assert Counter(one.person_id for one in answers if one.item == "agreed") == Counter(one.id for one in known)
+    assert Counter(one.person_id for one in answers if one.item == "agreed") == Counter(
+        one.id for one in known
+    )
     assert "Traceback" not in server.output.read_text()

@@ -7,6 +7,8 @@ from benchmarks.play import FAST
 from benchmarks.support.play_server import PATIENCE, PlayProcess
 from experiments.session.video import VideoWriter
 
+pytestmark = pytest.mark.slow
+
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 DESK = {"viewport": {"width": 1280, "height": 720}}
 
@@ -109,7 +111,7 @@ def elsewhere(browser, server, page, look):
 DARK_PHONE = {**PHONE, "color_scheme": "dark", "reduced_motion": "reduce"}
 
 
-@pytest.mark.parametrize("look", [DESK, pytest.param(DARK_PHONE, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("look", [DESK, DARK_PHONE])
 def test_every_page_passes_axe_and_is_left_by_keys(tmp_path, chromium, look):
     film = tmp_path / "flythrough.mp4"
     with VideoWriter(film, width=64, height=48) as writer:

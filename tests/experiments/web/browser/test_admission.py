@@ -6,10 +6,11 @@ from study_site import served
 from tests.experiments.visit.server.test_admission import CODES, PHASES, agree, ids, leave
 from tests.experiments.web.browser.test_accessibility import violations
 
+pytestmark = pytest.mark.slow
+
 RECRUITMENT = f'[study.recruitment]\nplatform = "prolific"\n{CODES}'
 
 
-@pytest.mark.slow
 def test_who_waits_goes_on_also_without_scripts_and_who_began_here_continues(tmp_path, chromium, monkeypatch):
     monkeypatch.setattr("experiments.visit.server.trials.REFRESH", (1.0, 1.0))
     with served(tmp_path, PHASES + RECRUITMENT, workers=1) as site, site.client() as client:

@@ -8,6 +8,8 @@ import pytest
 from hud.markers import flagpole
 from tools.drawn_pairs import View, draw_pairs, sampled_scene, ssim, views
 
+pytestmark = pytest.mark.slow
+
 LEAST, MEAN = 0.95, 0.97  # SSIM of a pair, and of all
 # A person in the hall looks at a wall, and a pole is behind it in the bedroom.
 BEHIND_A_WALL, POLE = (6.4, 5.15, 3.36, 0.0), flagpole((1.2, 2.6, 0.0), x_ray=True)
@@ -21,7 +23,6 @@ def pairs(chromium):
     return draw_pairs(chromium, scene, views(scene))
 
 
-@pytest.mark.slow
 def test_pictures_of_all_rooms_look_as_those_of_mjsim(pairs, record_property):
     similar = [pair.similarity for pair in pairs]
     milliseconds = [pair.milliseconds for pair in pairs]

@@ -14,11 +14,12 @@ from tests.experiments.web.browser.key_presser import choose
 from tests.experiments.web.browser.pages import pass_story
 from tools.drawn_pairs import decoded, ssim
 
+pytestmark = pytest.mark.slow
+
 LEAST = 0.95  # SSIM, as of the pairs of pictures
 STILL = 6.0  # s after which messages have faded, and the page has told its size
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("width", "height", "degrees"), [(1280, 720, None), (800, 600, None), (1280, 720, 105)]
 )

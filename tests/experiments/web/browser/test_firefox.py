@@ -8,6 +8,8 @@ from benchmarks.play import FAST
 from benchmarks.support.play_server import PlayProcess
 from tests.experiments.web.browser.pages import FIREFOX, firefox, pass_story
 
+pytestmark = pytest.mark.slow
+
 TITLE = "document.getElementById('panel-title')?.textContent"
 DRAWN = """(() => {
     const small = document.createElement("canvas").getContext("2d");

@@ -6,6 +6,8 @@ from experiments.cli.main import main
 from tests.experiments.web.browser.test_accessibility import DESK, PHONE, violations
 from tests.experiments.web.browser.test_view import HARMLESS, LOADED, VARIED
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
@@ -15,7 +17,6 @@ def address(tmp_path_factory):
     return (out / "index.html").as_uri()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("look", [DESK, {**PHONE, "color_scheme": "dark"}], ids=["desk", "phone"])
 def test_homes_are_found_and_looked_at_by_keys(chromium, address, look):
     faults = []

@@ -13,6 +13,8 @@ import experiments
 from mjsim.formats.gltf.export import export_scene
 from tools.drawn_pairs import decoded, sampled_scene, served
 
+pytestmark = pytest.mark.slow
+
 EMULATOR = Path(__file__).parents[4] / "experiments/web/client/node_modules/iwer/build/iwer.min.js"
 START = """async ([position, heading]) => {
   const device = new IWER.XRDevice(IWER.metaQuest3);
@@ -77,7 +79,6 @@ def page(chromium):
         page.close()
 
 
-@pytest.mark.slow
 def test_a_headset_shows_the_house_and_the_hud_to_both_eyes(page):
     assert page.evaluate(START, [[6.4, 5.2, 1.6], 0.5])
     page.wait_for_function("frames > 3", timeout=PATIENCE)

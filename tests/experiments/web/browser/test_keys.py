@@ -17,19 +17,18 @@ from hud.conditions import CONDITIONS
 from tests.experiments.web.browser.key_presser import WATCH, KeyPresser, choose
 from tests.experiments.web.browser.pages import pass_story
 
+pytestmark = pytest.mark.slow
+
 HARMLESS = (  # said where there is no graphics card, or because a test asks
     "KHR_parallel_shader_compile",
     "GL Driver Message",
 )
 FEW = [("chromium", 6, "none"), ("firefox", 6, "optimal")]
 MANY = [(browser, 6, name) for browser in ("chromium", "firefox") for name in CONDITIONS]
-SLOW = MANY if "MJSIM_ALL_CONDITIONS" in os.environ else FEW
+CASES = MANY if "MJSIM_ALL_CONDITIONS" in os.environ else FEW
 
 
-@pytest.mark.parametrize(
-    ("browser", "objects", "assistance"),
-    [("chromium", 1, "optimal"), *(pytest.param(*case, marks=pytest.mark.slow) for case in SLOW)],
-)
+@pytest.mark.parametrize(("browser", "objects", "assistance"), CASES)
 def test_objects_are_put_away_by_keys(tmp_path, request, browser, objects, assistance):
     page = request.getfixturevalue(f"{browser}_page")
     words = ("--objects", str(objects), "--assistance", assistance, *FAST)

@@ -11,6 +11,8 @@ from experiments.web.client_files import trial_texts
 from tests.experiments.web.browser.study_visit import STUDY
 from tests.experiments.web.browser.test_layout import check_shapes
 
+pytestmark = pytest.mark.slow
+
 PHASES = 'phases = ["training", "task", "completion"]'
 # All texts of the page, also of attributes that screen readers read.
 READ = """() => [...document.querySelectorAll("body *")].flatMap(e => [

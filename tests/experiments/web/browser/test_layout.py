@@ -8,6 +8,8 @@ import experiments.web
 from benchmarks.play import FAST
 from benchmarks.support.play_server import PATIENCE, PlayProcess
 
+pytestmark = pytest.mark.slow
+
 STYLE = Path(experiments.web.__file__).parent / "client" / "static" / "style.css"
 CHOICE = "<fieldset class=question><label><input type=radio> <span>{}</span></label></fieldset>"
 SHAPES = {"wide": (1280, 720), "4:3": (1024, 768), "narrow": (800, 600), "phone": (390, 844)}
@@ -113,7 +115,6 @@ def check_hands(page):
     assert tops[0] == tops[1]
 
 
-@pytest.mark.slow
 def test_buttons_of_a_phone_held_across_cover_no_list(tmp_path, chromium):
     page = chromium.new_context(**PHONE_ACROSS).new_page()
     page.set_default_timeout(1000.0 * PATIENCE)

@@ -22,6 +22,8 @@ from hud.compose import compose
 from hud.conditions import condition
 from hud.messages import message
 
+pytestmark = pytest.mark.slow
+
 CONDITIONS = ("none", "highlight", "optimal", "guided", "highlight-regret", "optimal-bins")
 # What only one of them writes around the content: words for counts, titles, and what only screen readers say.
 PAGE_ALONE = {

@@ -10,6 +10,8 @@ from benchmarks.support.play_server import PATIENCE
 from tests.experiments.web.browser.study_visit import STUDY
 from tests.experiments.web.browser.test_accessibility import DESK, PHONE, violations
 
+pytestmark = pytest.mark.slow
+
 CODE = """
 [study.recruitment]
 completed = "DONE"
@@ -53,7 +55,7 @@ def at_phase(folder, name, status="arrived"):
     database.close()
 
 
-@pytest.mark.parametrize("look", [DESK, pytest.param(PHONE, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("look", [DESK, PHONE])
 def test_no_page_breaks_a_rule_of_axe_core(served, chromium, look):
     url, folder = served
     page = chromium.new_context(**look).new_page()

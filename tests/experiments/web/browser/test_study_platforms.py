@@ -23,6 +23,8 @@ from tests.experiments.web.browser.key_presser import WATCH
 from tests.experiments.web.browser.pages import FIREFOX, XVFB, Chromium, firefox, virtual_screen
 from tests.experiments.web.browser.study_visit import STUDY, StudyVisit
 
+pytestmark = pytest.mark.slow
+
 RECRUITMENT = """
 [study.recruitment]
 platform = "{name}"
@@ -83,7 +85,6 @@ def platform(name, monkeypatch):
         yield running
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("browser", "name"), CASES)
 def test_a_whole_visit_from_the_platform_and_back(served, platform, secure_page):
     (url, folder), page = served, secure_page

@@ -7,6 +7,8 @@ from experiments.trials.trial_config import TrialConfig
 from experiments.web.client_files import STATIC
 from experiments.web.viewing.page import view_page
 
+pytestmark = pytest.mark.slow
+
 HARMLESS = ("KHR_parallel_shader_compile", "GL Driver Message")  # said where there is no graphics card
 LOADED = "document.getElementById('debug').textContent === ''"
 # How much of the picture differs from its commonest colour.
@@ -80,7 +82,6 @@ def test_every_camera_shows_the_house(page, camera):
     page.wait_for_function(f"({VARIED})().then((share) => share > 0.3)")
 
 
-@pytest.mark.slow
 def test_a_headset_shows_the_run_from_the_persons_eyes(chromium, address):
     if not EMULATOR.is_file():
         pytest.skip("the client's packages are not installed: npm ci")
