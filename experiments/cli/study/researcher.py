@@ -21,8 +21,10 @@ Manage the accounts for the researcher's page (`mjsim study serve --researcher-p
 all accounts.
 
 A viewer sees everything and watches sessions. An assistant can also pause the study and read the audit log. An owner
-can also stop the study and change quotas. The password needs at least {MIN_PASSWORD} characters. It
-is prompted for, read from standard input if that is not a terminal, or generated with --generate."""
+can also stop the study and change quotas.
+
+The password needs at least {MIN_PASSWORD} characters. It is prompted for, read from standard input if that is not a
+terminal, or generated with --generate."""
 
 
 def add_parser(commands: Any) -> None:

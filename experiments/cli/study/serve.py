@@ -45,8 +45,8 @@ task, training, task, survey, and the return to the recruitment platform. STUDY.
 (docs/study.md). Print the URL on a separate line and open it.
 
 All data are stored in --out: the database, run directories and journals of trials, the film, and the secret by which
-participants of a platform are recognized ({SECRET} sets another secret). Ctrl-C stops the server. Repeat the command to
-continue the study; participants continue where they stopped."""
+participants of a platform are recognized ({SECRET} sets another secret). Ctrl-C stops the server.
+Repeat the command to continue the study. Participants continue where they stopped."""
 
 
 HOSTS = """\
