@@ -36,7 +36,7 @@ WALL_GAP = 0.05  # extra distance between planned paths and walls, in metres, so
 
 @dataclass(frozen=True, eq=False)
 class House:
-    """A house and all data that are the same in every episode.
+    """A house, with all data that its episodes have in common.
 
     Attributes:
         sampling_floor: Navmesh of the default person, on which objects and start positions are sampled for every
@@ -177,7 +177,7 @@ class House:
 
 
 def read_words(language: str = "en") -> Mapping[str, Mapping[str, Any]]:
-    """Return all texts of a language, by section and name.
+    """Return the texts of a language as a dictionary of sections.
 
     Raises:
         ConfigError: The language is not available.

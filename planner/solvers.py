@@ -22,7 +22,7 @@ SOLVERS = {
     "greedy": ("planner.greedy_solver", "GreedySolver"),
 }
 DEFAULT_SOLVER = "exact"
-PATIENT_WORK = 60_000_000  # state limit of exact searches in offline use, about 30 s with 30 objects
+PATIENT_WORK = 60_000_000  # maximum number of states in an exact search outside of live sessions
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from experiments.trials.table import described, trial_columns
 _HEAD = """\
 # Data dictionary
 
-This page is made from the types by `make data-dictionary`. Lengths are in metres, times in simulated seconds, angles in
+`make data-dictionary` generates this page from the types. Lengths are in metres, times in simulated seconds, angles in
 radians; z is up.
 
 ## metrics.json

@@ -150,7 +150,7 @@ class Record:
         return WorldState.from_json(physics, str(details))
 
     def checkpoint_before(self, time: float) -> int | None:
-        """Return the control step of the last checkpoint up to a time in seconds, or None if none exists."""
+        """Return the control step of the last checkpoint at or before `time`, in seconds, or None without one."""
         times = self.trajectory["time"]
         return max((step for step in self.checkpoint_steps if times[step] <= time + 1e-9), default=None)
 

@@ -1,4 +1,4 @@
-"""Sessions, in which a participant and an assistant act in the simulated world, and films of sessions.
+"""Sessions of a participant and an assistant in the simulated world, and the films of these sessions.
 
 Trials, replays and browser sessions all use the class `Session`.
 """

@@ -20,7 +20,7 @@ from mjsim.values.errors import HouseError
 
 GRID = 0.2  # cell size of the floor plan grid, in metres
 TRIES = 500  # maximum number of room programmes that are tried
-EFFORT = 0.025  # time limit of the solver per programme, in deterministic seconds
+EFFORT = 0.025  # work limit of the solver for one room programme, in its deterministic time unit
 SLACK, LARGE_SLACK = 0.25, 0.45  # relative tolerance of room areas in small and in large homes
 LARGE = 9  # minimum number of rooms in a large home
 VOID = 1.2  # minimum side length of the cut-out corner in an L-shaped outline, in metres

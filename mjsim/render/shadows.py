@@ -15,7 +15,7 @@ from mjsim.render.markers import add_decorative_geom
 
 # Name of a material with a round texture that fades outwards. Houses without it have no contact shadows.
 MATERIAL = "shadow_round"
-BORDER = 0.05  # distance in metres by which a spot extends beyond its object, because its edges are faint
+BORDER = 0.05  # how far a shadow with its faint edges extends beyond the object, in metres
 # Height of a spot above the object's lowest point, in metres. Spots must be above rugs (at most 5 mm, see
 # docs/models.md) and below the bottom of a plate (7 mm).
 LIFT = 0.006

@@ -97,7 +97,7 @@ def read_measures(path: Path = FILE) -> Measures:
 
 
 def with_survey(measures: Measures, folder: Path) -> Measures:
-    """Add the survey that `mjsim study collect` has written next to a table, if there is one."""
+    """Add the survey items from `survey.json`, if `mjsim study collect` wrote this file to the folder."""
     path = folder / SURVEY
     return measures.of(msgspec.convert(read_json(path), Survey)) if path.is_file() else measures
 

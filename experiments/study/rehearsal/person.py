@@ -262,7 +262,7 @@ MARK = "Rehearsal: drawn at random"
 
 
 def form_of(phase: Phase, rng: np.random.Generator) -> dict[str, Any]:
-    """Return a form with random answers that the phase accepts. It has no answers if there are no items."""
+    """Return random answers that the phase accepts, or an empty form if the phase has no items."""
     example: dict[str, Any] = getattr(phase, "example", dict)()
     items = phase.items if isinstance(phase, FormPhase) else ()
     points = len(phase.texts.scale) if isinstance(phase, FormPhase) else 0

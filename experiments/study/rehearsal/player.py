@@ -12,9 +12,9 @@ from planner.errors import UnreachableError
 STEP = 0.04  # duration of a control step, in seconds
 STEPS = 16  # number of control steps per input
 NEAR = 0.15  # distance at which a corner of the path counts as reached, in metres
-ALIGNED = 0.7  # largest heading error with which the player starts to walk, in radians
+ALIGNED = 0.7  # largest heading error at which the player starts to walk, in radians
 SEEN = 0.8  # distance at which a viewpoint counts as visited, in metres
-STUCK = 0.05  # distance in metres below which the player is stuck after `STUCK_AFTER` inputs
+STUCK = 0.05  # A player who moves less than this distance, in metres, in `STUCK_AFTER` inputs is stuck.
 STUCK_AFTER = 6
 BACKWARDS = 3  # number of inputs for which a stuck player walks backwards
 PRESS_GAP = 15  # shortest time between two key presses, in control steps

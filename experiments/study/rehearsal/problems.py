@@ -74,7 +74,7 @@ def _found(study: Study) -> Iterator[tuple[str, str]]:
 def _lacks(study: Study) -> list[str]:
     """Return what the consent text does not name."""
     settings, text = study.settings, "\n".join(study.texts[CONSENT].paragraphs()).casefold()
-    words = {about: study.texts["consent_check"][name].split("|") for name, about in NAMED.items()}
+    words = {about: study.texts["consent_check"][name].split(", ") for name, about in NAMED.items()}
     words |= {"the controller": [settings.institution], "the address for questions": [settings.contact]}
     return [about for about, any_of in words.items() if not any(word.casefold() in text for word in any_of)]
 

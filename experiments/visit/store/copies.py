@@ -43,7 +43,7 @@ async def back_up(source: Database, path: Path) -> None:
             await target.close()
         one_file(part)
         try:
-            os.link(part, path)  # fails if the backup exists by now, while a rename would replace it
+            os.link(part, path)  # unlike a rename, this fails if the backup exists
         except FileExistsError as error:
             raise StoreError(TAKEN.format(path)) from error
         except OSError:  # the file system does not support links

@@ -55,7 +55,7 @@ class Rooms:
     reason: str  # explanation of how the rooms were found, for the report
 
     def rectangles(self, grid: FloorGrid) -> list[tuple[str, Floats, Floats]]:
-        """Return rectangles that cover all rooms, each as room key, lower and upper corner (2,) in metres."""
+        """Return rectangles that cover all rooms: room key, lower corner and upper corner (2,), in metres."""
         found = []
         nx, ny = (np.array(self.labels.shape) // _COARSE).tolist()
         blocks = self.labels[: nx * _COARSE, : ny * _COARSE].reshape(nx, _COARSE, ny, _COARSE)

@@ -25,7 +25,7 @@ _SMALL = 0.5  # size below which a mesh is replaced by its hull, in metres
 _HANGING = 1.6  # height above which lamps and pictures do not collide, in metres
 # Height in metres above which furniture becomes a box. A hull would appear to cover the floor below.
 _OVERHEAD = 0.8
-_FURNITURE = 1.5  # maximum side length of furniture, whose inside counts as filled, in metres
+_FURNITURE = 1.5  # Closed meshes up to this side length, in metres, count as solid furniture.
 _ROOM = (2.0, 2.0, 1.8)  # size in metres above which a closed mesh is a hollow room, not a block
 _FEW = 30  # maximum number of voxel boxes in a piece of furniture
 _MAX_PARTS = 60  # maximum number of connected parts of a piece that are processed individually

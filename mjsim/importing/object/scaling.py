@@ -15,7 +15,7 @@ _Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0
 
 @dataclass(frozen=True)
 class Scaling:
-    """The conversion of the coordinates in a mesh file to metres, with the z axis up."""
+    """Converts the coordinates of a mesh file to metres, with the z axis up."""
 
     unit: str  # unit of length in the file, which is a key of `UNITS`
     up: str  # vertical axis in the file, `y` or `z`

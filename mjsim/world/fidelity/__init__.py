@@ -1,4 +1,4 @@
-"""The two levels of fidelity. `full` simulates all movements by physics, and `event` only falling objects."""
+"""The two levels of fidelity: `full` simulates everything with physics, `event` only falling objects."""
 
 from mjsim.house.scene.scene import Scene
 from mjsim.values.options import WorldOptions
