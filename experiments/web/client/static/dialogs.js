@@ -17,8 +17,9 @@ const dialog = (title, content, label, action) => ({
   buttons: label && action ? [[textOf(label), action]] : [],
 });
 
-/** @param {boolean} interrupted */
-export const loading = (interrupted) => dialog("one_moment", interrupted ? "restoring" : "loading");
+/** @param {boolean} interrupted @param {boolean} [late] true if the page has been loading for long */
+export const loading = (interrupted, late) =>
+  late ? dialog("one_moment", "loading_late", "try_again", "reload") : dialog("one_moment", interrupted ? "restoring" : "loading");
 
 /**
  * @param {string} trial
@@ -89,11 +90,12 @@ export const cannotDraw = (reason) => ({
  * @param {PageState} state
  * @param {number} left time until the trial may be ended, in s
  * @param {string} fault reason why this browser does not draw
+ * @param {boolean} late true if the page has been loading for long
  */
-export function dialogOf(shown, { wanted, reason, saved }, left, fault) {
+export function dialogOf(shown, { wanted, reason, saved }, left, fault, late) {
   switch (shown) {
     case "loading":
-      return loading(wanted);
+      return loading(wanted, late);
     case "ending":
       return ending(left);
     case "paused":

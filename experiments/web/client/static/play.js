@@ -28,6 +28,7 @@ import { textOf } from "./texts.js";
 import { rememberVisit } from "./visit.js";
 
 const DONE = 1500; // how long the end of a trial is shown, in ms
+const LATE = 20_000; // loading time after which the participant is offered to load the page again, in ms
 const NOTICE = 8000; // how long a notice is shown, in ms
 const TICK = 20; // timer period in ms, since animation frames stop in background pages
 
@@ -46,6 +47,7 @@ let asked = "";
 let left = 0; // time until the trial may be ended, when that was asked for, in s
 /** @type {Shown} */
 let shown = "loading";
+let loading = 0; // time since which the page has been loading, in ms; 0 if it is loaded
 const panel = new Panel(
   byId("panel", HTMLDialogElement),
   {
@@ -168,12 +170,17 @@ function update() {
   const next = shownIn(now);
   if (next !== "task" && session.phase === "running") stop(pauseReason(next));
   shown = next;
+  if (shown !== "loading") loading = 0;
+  else if (!loading) {
+    loading = performance.now();
+    setTimeout(update, LATE);
+  }
   const stopped = session.phase === "running" ? "paused" : session.phase;
   page.dataset.phase = shown === "task" ? "running" : stopped; // the style sheet hides the task while the clock is stopped
   for (const id of ["redraw-button", "server-draws"]) byId(id, HTMLElement).hidden = draw !== "auto" || !picture.fault;
   if (shown === "task" || shown === "help") panel.hide();
   else if (shown === "instructions") panel.show(instructions());
-  else panel.show(dialogs.dialogOf(shown, now, left, picture.fault));
+  else panel.show(dialogs.dialogOf(shown, now, left, picture.fault, performance.now() - loading >= LATE));
   if (shown === "failed") connection.close();
   if (shown === "paused" && document.pointerLockElement) document.exitPointerLock();
 }

@@ -96,6 +96,19 @@ describe("a trial", () => {
     expect(location.reload).toHaveBeenCalledOnce();
   });
 
+  test("can be loaded again when loading takes long", async () => {
+    await opened();
+    socket().state("ready");
+    wait(19);
+    expect(part("panel-actions").children).toHaveLength(0);
+    wait(2);
+    choose("Try again");
+    expect(location.reload).toHaveBeenCalledOnce();
+    socket().onmessage({ data: frame({ number: 1 }) });
+    await settled();
+    expect(title()).toBe("Your task");
+  });
+
   test("explains the keys in the training, which may be skipped", async () => {
     await opened({ trial: "training" });
     socket().state("ready");
