@@ -31,6 +31,7 @@ def in_this_process(monkeypatch):
     monkeypatch.setattr(gallery, "worker_pool", Here)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("in_this_process")
 def test_homes_are_drawn_once_and_listed(tmp_path, capsys):
     own, out = write_example_house(tmp_path / "my house").parent, tmp_path / "gallery"
