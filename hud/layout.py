@@ -46,7 +46,7 @@ class Layout:
     """The rectangles of all panels in a frame, and the rows and lines of text in the panels."""
 
     panels: Mapping[str, Rect]  # rectangles of the visible panels by name, in drawing order
-    free: Rect  # area between the panels in which the view is free
+    free: Rect  # area between the panels, which no panel covers
     first: int  # index of the first visible row of the task list
     rows: tuple[ListRow, ...]  # visible rows of the task list
     bin_rows: tuple[ListRow, ...]  # visible rows of the list of bins

@@ -106,7 +106,7 @@ class TaskBoard:
         self._scroll = min(max(self._scroll + rows, -max_rows), max_rows)
 
     def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
-        """Show a message about an event or a refused action instead of the last one. `time` is in seconds."""
+        """Replace the displayed message. Messages report events and refused actions. `time` is in seconds."""
         shown = self._shown(time)
         if shown.key == REPLANNED and time >= shown.since + READING_TIME:
             self._replanned_at = None

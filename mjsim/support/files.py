@@ -191,7 +191,7 @@ def source_digest(*places: str) -> str:
 
 
 def digest_of(*places: Path) -> str:
-    """Return a digest with 16 hexadecimal digits of the paths and contents of files."""
+    """Return a digest of the paths and contents of files, as 16 hexadecimal digits."""
     digest = hashlib.sha256()
     for place in places:
         for path in [place] if place.is_file() else sorted(place.rglob("*.py")):

@@ -33,7 +33,7 @@ def note_copy(folder: Path, kind: Kind, path: Path, source: str = "") -> None:
 
 
 def note_derived(source: Path, kind: Kind, path: Path) -> None:
-    """Add a file made from a run or table to the list of copies in the nearest parent that has a list."""
+    """Record a file that was made from a run or a table in the nearest `copies.jsonl` above its source."""
     source = source.absolute()
     for folder in (source, *source.parents):
         if (folder / INDEX).is_file():

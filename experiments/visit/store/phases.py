@@ -41,7 +41,7 @@ _ROWS_OF_ONE = {table: rows.where(table.c.person_id == bindparam("person")) for 
 
 
 class Phases(StorePart):
-    """Store methods for phases, answers and trials."""
+    """The part of the store for phases, answers and trials."""
 
     async def show_phase(self, person_id: int, name: str, now: datetime | None = None) -> PhaseRow:
         """Record when a phase was first shown to a participant, and return its row."""

@@ -24,7 +24,7 @@ _Line = tuple[int, int, int]  # axis of a line, and its other two coordinates in
 
 
 def welded(model: Any, surfaces: Sequence[GeomSurface]) -> list[GeomSurface]:
-    """Add vertices to edges of opaque boxes that are parallel to an axis, where a corner of another box is."""
+    """Split the edges of opaque axis-aligned boxes at the corners of other boxes."""
     corners: dict[_Line, set[int]] = {}
     boxes = [surface for surface in surfaces if _is_opaque_box(model, surface)]
     for surface in boxes:

@@ -236,7 +236,7 @@ def _without_comments(path: Path) -> io.BytesIO:
 
 
 def _collada_frame(path: Path) -> Floats:
-    """Return the transform (4, 4) of a COLLADA file to metres with z up, which trimesh does not apply."""
+    """Return the transform (4, 4) from a COLLADA file to metres with z up. trimesh ignores unit and axis."""
     unit, up = 1.0, "Y_UP"
     with parsing(path):
         for tag, element in _elements(path):

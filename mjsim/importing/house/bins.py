@@ -20,7 +20,7 @@ AREA = 5.0  # walkable floor area that is required for each bin, in square metre
 _STAND = 0.8  # depth of the free floor that is required in front of a bin, in metres
 _ASIDE = 0.05  # width of the free floor on each side of a bin, in metres
 _WALL = 0.15  # maximum distance between a bin and the wall behind it, in metres
-_WIDE = 0.4  # radius of a body for which bins must leave the floor connected, in metres
+_WIDE = 0.4  # radius of a body that can still reach all of the floor once the bins are placed, in metres
 _TRIES = 300  # maximum number of poses that are tried for a bin in each room
 _LOST = 1.0  # walkable floor that a bin may block in addition to its surroundings, in square metres
 # Bins in order of priority, and the types of rooms in which people would look for them.

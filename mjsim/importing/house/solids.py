@@ -19,7 +19,7 @@ BUDGET = 1500  # maximum number of colliding geoms in a house
 LOW, HIGH = 0.051, 1.9
 # Voxel sizes in metres. The first size for which the number of geoms is within the budget is used.
 _PITCHES = (0.05, 0.075, 0.1, 0.15, 0.2)
-_BOX = 0.95  # minimum share of its bounding box that a box-shaped hull fills
+_BOX = 0.95  # A hull that fills at least this share of its bounding box becomes a box.
 _CONVEX = 0.85  # minimum share of its hull that a convex mesh fills
 _SMALL = 0.5  # size below which a mesh is replaced by its hull, in metres
 _HANGING = 1.6  # height above which lamps and pictures do not collide, in metres
