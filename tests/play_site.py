@@ -1,6 +1,7 @@
 """`mjsim play` with scripted workers, served to a test client."""
 
 import argparse
+import functools
 from contextlib import contextmanager
 
 import numpy as np
@@ -23,15 +24,21 @@ def arguments_of(*words):
     return parser.parse_args(["play", *words])
 
 
+@functools.cache
+def planned(*words):
+    """Arguments and plan of `mjsim play WORDS`, which nobody changes. A plan reads a house and all texts."""
+    arguments = arguments_of(*words)
+    task, questions = play.task_of(arguments), play.questions_of(arguments)
+    return arguments, plan_of_play(arguments, task, play.shown_phases(arguments), questions)
+
+
 def play_app(folder, pool, *words, sessions=20, made=lambda _: None):
     """The application that `mjsim play WORDS` serves; `made` gets the server."""
-    arguments = arguments_of(*words)
-    task = play.task_of(arguments)
+    arguments, plan = planned(*words)
     folder.mkdir(exist_ok=True)
 
     async def make():
         store = await Store.open(f"sqlite:///{folder / 'study.db'}", NAME, "0" * 64)
-        plan = plan_of_play(arguments, task, play.shown_phases(arguments), play.questions_of(arguments))
         procedure = Procedure(plan, store, VisitFolders(folder), np.random.default_rng(0))
         await procedure.adopt()
         server = VisitServer(

@@ -26,7 +26,7 @@ DEVICE = {"frames_per_s": "60", "latency_ms": "40", "width": "1280", "height": "
 DEVICE |= {"keyboard": "yes", "webgl": "yes", "renderer": "a card"}
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def study():
     study = read_people_study(FOLDER / "paper.toml")
     return dataclasses.replace(study, settings=msgspec.structs.replace(study.settings, minimum={}))
