@@ -7,6 +7,7 @@ from contextlib import contextmanager
 import numpy as np
 from scripted_workers import ORIGIN
 from starlette.testclient import TestClient
+from study_database import new_database
 from study_site import MadeInItsLoop
 
 from experiments.cli import play
@@ -36,9 +37,10 @@ def play_app(folder, pool, *words, sessions=20, made=lambda _: None):
     """The application that `mjsim play WORDS` serves; `made` gets the server."""
     arguments, plan = planned(*words)
     folder.mkdir(exist_ok=True)
+    url = new_database(folder / "study.db")
 
     async def make():
-        store = await Store.open(f"sqlite:///{folder / 'study.db'}", NAME, "0" * 64)
+        store = await Store.open(url, NAME, "0" * 64)
         procedure = Procedure(plan, store, VisitFolders(folder), np.random.default_rng(0))
         await procedure.adopt()
         server = VisitServer(
