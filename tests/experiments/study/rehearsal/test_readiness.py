@@ -247,7 +247,8 @@ def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
 
 @pytest.mark.usefixtures("quick")
 def test_a_dry_run_finds_a_phase_that_takes_anything(tmp_path, monkeypatch):
-    study = with_text(tmp_path, minimum=("story = 20", ""))
+    short = 'minutes = 10\nphases = ["consent", "task", "survey", "completion"]'
+    study = with_text(tmp_path, phases=("minutes = 10", short), minimum=("story = 20", ""))
     phases = [
         _Sloppy(plan_of(study), "survey") if p.name == "survey" else p for p in phases_of(plan_of(study))
     ]
