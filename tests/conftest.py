@@ -1,7 +1,9 @@
 """Fixtures shared by the tests: the apartment as shipped, and a small house written for tests."""
 
+import functools
 import os
 import signal
+import ssl
 import sys
 
 # Before NumPy is loaded: on small matrices, threads of OpenBLAS cost more than they gain.
@@ -62,6 +64,14 @@ def episode(catalogue, navmesh):
 def scene(episode, catalogue):
     """The composed `episode`; do not change it."""
     return compose(episode, catalogue)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def certificates_read_once():
+    """Each HTTP client reads the certificates of all authorities, which takes longer than many tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ssl, "create_default_context", functools.cache(ssl.create_default_context))
+        yield
 
 
 @pytest.fixture(autouse=True)

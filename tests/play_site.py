@@ -1,11 +1,13 @@
 """`mjsim play` with scripted workers, served to a test client."""
 
 import argparse
+import functools
 from contextlib import contextmanager
 
 import numpy as np
 from scripted_workers import ORIGIN
 from starlette.testclient import TestClient
+from study_database import new_database
 from study_site import MadeInItsLoop
 
 from experiments.cli import play
@@ -23,15 +25,22 @@ def arguments_of(*words):
     return parser.parse_args(["play", *words])
 
 
+@functools.cache
+def planned(*words):
+    """Arguments and plan of `mjsim play WORDS`, which nobody changes. A plan reads a house and all texts."""
+    arguments = arguments_of(*words)
+    task, questions = play.task_of(arguments), play.questions_of(arguments)
+    return arguments, plan_of_play(arguments, task, play.shown_phases(arguments), questions)
+
+
 def play_app(folder, pool, *words, sessions=20, made=lambda _: None):
     """The application that `mjsim play WORDS` serves; `made` gets the server."""
-    arguments = arguments_of(*words)
-    task = play.task_of(arguments)
+    arguments, plan = planned(*words)
     folder.mkdir(exist_ok=True)
+    url = new_database(folder / "study.db")
 
     async def make():
-        store = await Store.open(f"sqlite:///{folder / 'study.db'}", NAME, "0" * 64)
-        plan = plan_of_play(arguments, task, play.shown_phases(arguments), play.questions_of(arguments))
+        store = await Store.open(url, NAME, "0" * 64)
         procedure = Procedure(plan, store, VisitFolders(folder), np.random.default_rng(0))
         await procedure.adopt()
         server = VisitServer(

@@ -35,5 +35,13 @@ def made_up_people(sizes=SIZES, seed=0, **same):
     return rows
 
 
+def of_measures(rows, *kept):
+    """Rows without the other measures, of each of which a report draws figures, which takes long."""
+    others = {"nd_feasible", "nd_strict_2n", "ipl_locations", "task_distance_m", "completion_time_s"} - {
+        *kept
+    }
+    return [{name: value for name, value in row.items() if name not in others} for row in rows]
+
+
 def table_of(rows):
     return study_table(rows, read_measures(), "here")

@@ -11,6 +11,7 @@ from typing import Any
 import httpx
 import numpy as np
 from scripted_workers import ScriptedPool
+from study_database import new_database
 
 from experiments.cli.server import http_server, listen, url_of
 from experiments.study.file import read_people_study
@@ -95,14 +96,13 @@ def served(folder, settings="", researchers=ROLES, workers=20):
     """A study with `settings` added to its file, and researchers of these names and roles."""
     (folder / "study.toml").write_text(CELLS + settings)
     (folder / "film.mp4").write_bytes(b"a film")
+    url = new_database(folder / "study.db")
     site, ready, servers = Site(read_people_study(folder / "study.toml")), threading.Event(), []
     failed = []
 
     async def main():
         site.loop = asyncio.get_running_loop()
-        site.store = await Store.open(
-            f"sqlite:///{folder / 'study.db'}", "small", "0" * 64, password_memory_kib=64
-        )
+        site.store = await Store.open(url, "small", "0" * 64, password_memory_kib=64)
         known = {one.name for one in await site.store.researchers.all()}
         for role in set(researchers) - known:
             await site.store.researchers.add(role, PASSWORD, role)

@@ -68,11 +68,12 @@ def test_each_text_is_shown_somewhere():
     )
     shown += code("experiments/web/client/static/**/*.js", "experiments/web/client/templates/**/*.html")
     prefixes = tuple(re.findall(r"[`\"](\w+_)\$\{", shown))
+    named = set(re.findall(r"(?<=[\"'`])\w+(?=[\"'`])|(?<=texts\.)\w+", shown))
     unused = [
         f"{section}.{key}"
         for section, table in read_words().items()
         for key in table
-        if not re.search(rf"[\"'`]{key}[\"'`]|texts\.{key}\b", shown)
+        if key not in named
         and not (section == "trial" and key.startswith(prefixes))
         and not (key.endswith("_title") and key.removesuffix("_title") in table)
         and not (section == "hud" and key in KINDS)

@@ -222,7 +222,7 @@ def _squares(means: Mapping[Cell, float], effect: str) -> float:
     first, second = (np.array([cell[k] for cell in means]) for k in (0, 1))
     if len(set(second.tolist())) == 1 or len(set(first.tolist())) == 1:
         return float(((values - values.mean()) ** 2).sum())
-    return two_way_squares(values, first, second)[effect]
+    return two_way_squares(values, first, second, effects=[effect])[effect]
 
 
 def _interval(pool: Pool, wanted: Wanted, rng: np.random.Generator) -> tuple[int, int]:

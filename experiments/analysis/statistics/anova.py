@@ -186,10 +186,14 @@ def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int
 
 
 def two_way_squares(
-    values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2
+    values: Values,
+    first: NDArray[Any],
+    second: NDArray[Any],
+    kind: int = 2,
+    effects: Iterable[str] = EFFECTS,
 ) -> dict[str, float]:
-    """Return the sum of squares of each effect. The arguments are the same as those of `two_way`."""
-    return _squares(_crossed(values, first, second), kind)
+    """Return the sum of squares of each of `effects`. The other arguments are those of `two_way`."""
+    return _squares(_crossed(values, first, second), kind, effects)
 
 
 def _crossed(values: Values, first: NDArray[Any], second: NDArray[Any]) -> Cells:
@@ -199,13 +203,13 @@ def _crossed(values: Values, first: NDArray[Any], second: NDArray[Any]) -> Cells
     return cells
 
 
-def _squares(cells: Cells, kind: int) -> dict[str, float]:
+def _squares(cells: Cells, kind: int, effects: Iterable[str] = EFFECTS) -> dict[str, float]:
     """Return the amount by which each effect reduces the residual sum of squares.
 
     For type II, main effects are tested in a model without interaction, and for type III in the full model.
     """
     sums = {}
-    for effect in EFFECTS:
+    for effect in effects:
         full = [name for name in cells.columns if kind == 3 or effect == name or name != "interaction"]
         without = cells.residual(name for name in full if name != effect)
         sums[effect] = max(without - cells.residual(full), 0.0)

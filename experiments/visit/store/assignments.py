@@ -214,9 +214,10 @@ class Assignments(StorePart):
 
 
 async def _free_place(connection: AsyncConnection, holders: Sequence[Any], wanted: int) -> int | None:
-    free = sorted(set(range(wanted)) - {holder.place for holder in holders})
-    if free:
-        return free[0]
+    taken = {holder.place for holder in holders}
+    free = next((place for place in range(wanted) if place not in taken), None)
+    if free is not None:
+        return free
     abandoned = next((one for one in holders if not one.fresh and one.place < wanted), None)
     if abandoned is None:
         return None

@@ -1,5 +1,6 @@
 """Texts that participants read. The folder `experiments/texts` has a text file and a story per language."""
 
+import functools
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -64,8 +65,8 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
         raise ConfigError(
             f"no texts in language {language!r}; there are {', '.join(languages())}, or name a file with all `texts`"
         )
-    english = _tables(FOLDER / "en.toml")
-    usual = _tables(FOLDER / f"{language}.toml") if known else english
+    english = _shipped("en")
+    usual = _shipped(language) if known else english
     own = _tables(path) if path else {}
     custom = {name: table for name, table in own.items() if ":" in name}  # texts of custom phases
     if untitled := [name for name, table in custom.items() if "title" not in table]:
@@ -101,6 +102,11 @@ def story_file(language: str) -> Path | None:
             f"there is no story in language {language!r}; name a file with `story` in [all_cells]"
         )
     return path
+
+
+@functools.cache
+def _shipped(language: str) -> dict[str, dict[str, Any]]:
+    return _tables(FOLDER / f"{language}.toml")
 
 
 def _tables(path: Path) -> dict[str, dict[str, Any]]:

@@ -1,5 +1,6 @@
 """Parse references to houses, and find the folder of packaged models."""
 
+import functools
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -54,7 +55,12 @@ def models_root() -> Path:
 
     It is inside an installed package, but next to the package in a source checkout.
     """
-    package = Path(__file__).resolve().parents[2]
+    return _models_near(__file__)
+
+
+@functools.cache
+def _models_near(file: str) -> Path:
+    package = Path(file).resolve().parents[2]
     candidates = (package / "models", package.parent / "models")
     for candidate in candidates:
         if (candidate / "houses").is_dir():

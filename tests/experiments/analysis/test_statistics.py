@@ -314,13 +314,13 @@ def test_the_mixed_model_of_a_published_example():
 def test_the_interval_of_the_share_of_houses_holds_the_true_one(share):
     rng, held = np.random.default_rng(4), 0
     houses, condition = np.repeat(np.arange(20), 6), np.tile([*"ab"], 60)
-    for _ in range(200):
+    for _ in range(100):
         values = rng.normal(0, math.sqrt(share), 20)[houses] + rng.normal(0, math.sqrt(1 - share), 120)
         house = mixed_model(values, condition, np.full(120, 6), {"house": houses}).random["house"]
         low, high = house.interval
         assert 0 <= low <= house.share <= high <= 1
         held += low <= share <= high
-    assert 0.91 <= held / 200 <= (1.0 if share == 0 else 0.99)
+    assert 0.91 <= held / 100 <= (1.0 if share == 0 else 0.99)
 
 
 @pytest.mark.parametrize(
@@ -394,14 +394,13 @@ def test_factors_with_as_many_levels_as_trials_or_the_same_ones_are_refused_at_o
         mixed_model(np.random.default_rng(0).normal(size=len(rows)), rows % 2, np.full(len(rows), 6), factors)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_sparse_crossproducts_give_the_model_of_dense_ones(seed, monkeypatch):
+def test_sparse_crossproducts_give_the_model_of_dense_ones(monkeypatch):
     """Persons crossed with houses, and houses with conditions nested in houses."""
-    rng = np.random.default_rng(seed)
-    person, house = rng.integers(0, 12, 240), rng.integers(0, 9, 240)
-    condition, levels = rng.choice([*"abc"], 240), rng.choice([6, 12], 240)
+    rng = np.random.default_rng(0)
+    person, house = rng.integers(0, 8, 120), rng.integers(0, 6, 120)
+    condition, levels = rng.choice([*"abc"], 120), rng.choice([6, 12], 120)
     both = np.char.add(house.astype(str), condition)
-    values = rng.normal(size=240) + rng.normal(size=12)[person] + rng.normal(size=9)[house]
+    values = rng.normal(size=120) + rng.normal(size=8)[person] + rng.normal(size=6)[house]
     factors = {"person": person, "house": house, "house x assistance": both}
 
     def found():

@@ -146,9 +146,9 @@ def test_a_floor_plan_has_no_objects(option, tmp_path, capsys):
     assert not out.exists()
 
 
-def test_both_formats_of_one_house_may_be_written_next_to_each_other(tmp_path, capsys):
+def test_both_formats_of_one_house_may_be_written_next_to_each_other(tmp_path, small_house, capsys):
     """The commands of docs/import.md: both write the same episode file, but none replaces another one."""
-    words = ["house", "--objects", "2", "--out"]
+    words = ["house", "--house", str(small_house), "--objects", "2", "--points", "4", "--out"]
     assert main([*words, str(tmp_path / "house.xml")]) == 0
     assert main([*words, str(tmp_path / "house.glb")]) == 0
     (tmp_path / "house.glb").unlink()
@@ -167,8 +167,9 @@ def test_a_house_for_stock_mujoco(tmp_path, capsys):
     assert f"{len(episode.objects)} misplaced objects" in capsys.readouterr().out
 
 
-def test_a_house_for_other_programs(tmp_path, capsys):
-    assert main(["house", "--objects", "3", "--seed", "3", "--out", str(tmp_path / "house.glb")]) == 0
+def test_a_house_for_other_programs(tmp_path, small_house, capsys):
+    words = ["house", "--house", str(small_house), "--objects", "3", "--points", "4", "--seed", "3"]
+    assert main([*words, "--out", str(tmp_path / "house.glb")]) == 0
     names = {node["name"] for node in File((tmp_path / "house.glb").read_bytes()).gltf["nodes"]}
     episode = Episode.load(tmp_path / "house.episode.json")
     assert {placed.name for placed in episode.objects} <= names
@@ -242,6 +243,7 @@ def test_the_version_is_told(capsys):
     assert capsys.readouterr().out.startswith("mjsim ")
 
 
+@pytest.mark.slow
 def test_modules_in_the_current_folder_are_found(tmp_path):
     """By the installed command, whose own folder is elsewhere: participant and planner of one's own."""
     (tmp_path / "mine.py").write_text(
@@ -262,18 +264,20 @@ def test_modules_in_the_current_folder_are_found(tmp_path):
     assert len(start["inputs"]["module mine"]) == 16
 
 
-@pytest.mark.parametrize(
-    "words", [[], ["run"], ["batch"], ["play"], ["study"], ["study", "score"]], ids=" ".join
-)
-def test_help_loads_nothing_of_the_simulator(words):
+def test_help_loads_nothing_of_the_simulator():
     """Start-up is most of the time of `--help`."""
-    code = (
-        "import sys\nfrom experiments.cli.main import main\n"
-        f"try:\n    main({[*words, '--help']})\nexcept SystemExit:\n    pass\n"
-        "print({'numpy', 'mujoco', 'numba', 'scipy', 'rich'} & set(sys.modules), file=sys.stderr)"
-    )
+    code = """import sys
+from experiments.cli.main import main
+for words in ([], ["run"], ["batch"], ["play"], ["study"], ["study", "score"]):
+    try:
+        main([*words, "--help"])
+    except SystemExit:
+        loaded = {"numpy", "mujoco", "numba", "scipy", "rich"} & set(sys.modules)
+        print(words, loaded or "nothing", file=sys.stderr)
+"""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stderr == "set()\n"
+    said = done.stderr.splitlines()
+    assert len(said) == 6 and all(line.endswith("] nothing") for line in said), said
 
 
 def test_a_command_without_its_extra_names_it(tmp_path, monkeypatch, capsys):

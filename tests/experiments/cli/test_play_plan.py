@@ -62,6 +62,7 @@ def test_every_visit_has_seeds_that_tables_can_hold():
     assert settings["order_seed"] == 5 and settings["house_seed"] == 0
 
 
+@pytest.mark.slow
 def test_play_needs_no_extra():
     missing = "argon2", "httpx", "prometheus_client", "aiomysql", "psycopg", "matplotlib", "statsmodels"
     code = f"import sys; sys.modules |= dict.fromkeys({missing}); import experiments.cli.play_plan, "

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from experiments.errors import ConfigError
-from experiments.house import House
 from experiments.participants.base import Choice
 from experiments.participants.boltzmann import draw
 from experiments.participants.registry import participant
@@ -52,11 +51,12 @@ def test_what_is_not_likely_is_hardly_ever_worked_out():
     assert len(asked) < 10
 
 
-def test_a_cold_participant_regrets_nothing_and_a_hot_one_walks_more(tmp_path):
-    house = House.load()
+def test_a_cold_participant_regrets_nothing_and_a_hot_one_walks_more(tmp_path, house):
     cold, hot = (
         run_trial(
-            TrialConfig(objects=6, assistance="optimal", seed=2, user=f"boltzmann:{temperature}"),
+            TrialConfig(
+                objects=6, assistance="optimal", seed=2, fidelity="event", user=f"boltzmann:{temperature}"
+            ),
             tmp_path / temperature,
             topdown=False,
             house=house,

@@ -109,7 +109,8 @@ def refusal(path, before, after):
 
 
 @pytest.mark.parametrize(("before", "after", "parts"), FAULTS, ids=[after for _, after, _ in FAULTS])
-def test_a_refusal_names_line_key_value_and_choices(tmp_path, before, after, parts):
+def test_a_refusal_names_line_key_value_and_choices(tmp_path, monkeypatch, before, after, parts):
+    monkeypatch.setattr("mjsim.house.scene.sampling.PACKINGS", 1)
     said, line = refusal(tmp_path / "study.toml", before, after)
     assert said.startswith(f"{tmp_path / 'study.toml'}, line {line}: ")
     assert [part for part in (after.partition(" ")[0], *parts) if part not in said] == [], said

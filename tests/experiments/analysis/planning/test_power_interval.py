@@ -7,7 +7,7 @@ from experiments.analysis.planning.power import Wanted, _interval
 from experiments.analysis.statistics.effects import people_per_cell
 from experiments.errors import StatisticsError
 
-CELLS = [(name, n) for name in ("highlight", "none", "optimal") for n in (6, 12, 18, 24)]
+CELLS = [(name, n) for name in ("none", "optimal") for n in (6, 12, 24)]
 
 
 def normal(rng, people):
@@ -19,14 +19,12 @@ def skewed(rng, people):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("people", "slope", "draw"), [(30, 0.8, normal), (200, 0.4, normal), (200, 0.4, skewed)]
-)
+@pytest.mark.parametrize(("people", "slope", "draw"), [(30, 0.8, normal), (200, 0.4, skewed)])
 def test_the_interval_of_people_needed_holds_their_number_in_nine_studies_of_ten(people, slope, draw):
     """Of people whose mean rises by `slope` standard deviations from 6 objects to 24."""
     means = {cell: slope * (cell[1] - 6) / 18 for cell in CELLS}
     ratio = np.var(list(means.values()))
-    needed = people_per_cell(ratio / (1 + ratio), 3, len(CELLS))
+    needed = people_per_cell(ratio / (1 + ratio), 2, len(CELLS))
     inside = []
     for seed in range(200):
         rng = np.random.default_rng(seed)

@@ -6,7 +6,7 @@ import zipfile
 import msgspec
 import numpy as np
 import pytest
-from study_people import made_up_people, table_of
+from study_people import made_up_people, of_measures, table_of
 
 from experiments.analysis.planning.preregistration import (
     departures,
@@ -338,9 +338,9 @@ def test_a_changed_preregistration_is_refused(study, tmp_path, change, message):
 def test_a_survey_of_ones_own_is_frozen_and_named_in_the_report(study, tmp_path, capsys):
     own = tmp_path / "own.toml"
     own.write_text(FILE.read_text().replace("[likert]", '[likert]\nease = "Felt at ease"'))
+    people = of_measures(people_as_planned(), "nd_feasible", "completion_time_s")
     write_tables(
-        tmp_path,
-        [row | {"user": "human", "likert_ease": 4 - k % 3} for k, row in enumerate(people_as_planned())],
+        tmp_path, [row | {"user": "human", "likert_ease": 4 - k % 3} for k, row in enumerate(people)]
     )
     assert main(["study", "analyze", str(tmp_path)]) == 2
     assert "--measures" in capsys.readouterr().err
@@ -355,7 +355,7 @@ def test_a_survey_of_ones_own_is_frozen_and_named_in_the_report(study, tmp_path,
 
 
 def test_the_commands_say_who_is_left_out_and_what_departs(study, tmp_path, capsys):
-    rows = people_as_planned()
+    rows = of_measures(people_as_planned(), "nd_feasible", "ipl_locations", "completion_time_s")
     rows[1]["completion_time_s"], rows[2]["ipl_locations"] = 900.0, float("inf")
     write_tables(tmp_path, rows)
     frozen = tmp_path / "p.zip"

@@ -8,7 +8,7 @@ import signal
 from collections.abc import Mapping
 
 import pytest
-from study_people import made_up_people
+from study_people import made_up_people, of_measures
 
 from experiments.cli.main import main
 from experiments.study.data.analyses import analysis_faults
@@ -33,7 +33,7 @@ def run(tmp_path_factory, house):
     return out
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def study():
     return read_people_study(FOLDER / "paper.toml")
 
@@ -218,7 +218,7 @@ def test_items_and_scale_of_ones_own_are_analysed_and_preregistered(tmp_path, ow
         row
         | {"user": "human", "participant": f"p{k}", "display_frames_per_s": 60.0}
         | {"likert_calm": 1 + k % 7, "likert_useful": 1 + k % 5}
-        for k, row in enumerate(made_up_people(PEOPLE))
+        for k, row in enumerate(of_measures(made_up_people(PEOPLE), "nd_feasible"))
     ]
     write_collected(Collected(rows, [], {}, {}, survey_of(own_study)), table)
     assert main(["study", "analyze", str(table), "--preregistration", frozen]) == 0, capsys.readouterr().err
@@ -240,7 +240,7 @@ def test_rules_about_displays_spare_simulated_people_and_unknown_columns_are_a_f
 ):
     path = own_study.path
     path.write_text(path.read_text().replace('"display_frames_per_s"', f'"{column}"'))
-    rows = [row | {"user": "rehearsal"} for row in made_up_people(PEOPLE)]
+    rows = [row | {"user": "rehearsal"} for row in of_measures(made_up_people(PEOPLE), "nd_feasible")]
     write_collected(Collected(rows, [], {}, {}, survey_of(own_study)), tmp_path / "table")
     faults = analysis_faults(read_people_study(path), tmp_path / "table", tmp_path / "analysis")
     if fault is not None:

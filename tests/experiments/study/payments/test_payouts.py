@@ -12,6 +12,7 @@ from datetime import timedelta
 
 import msgspec
 import pytest
+from study_database import new_database
 
 from experiments.cli.main import main
 from experiments.study.file import read_people_study
@@ -71,12 +72,12 @@ class Paid:
         self.file = folder / "study.toml"
         self.file.write_text(STUDY.format(platform=platform.name, url=platform.url))
         self.study = read_people_study(self.file)
+        self.url = new_database(folder / "study.db")
         asyncio.run(self._fill())
         self.words = ["study", "pay", str(self.file), str(folder), "--without-rehearsal"]
 
     async def open(self):
-        url = f"sqlite:///{self.folder / 'study.db'}"
-        return await Store.open(url, self.study.settings.name, self.study.sha256)
+        return await Store.open(self.url, self.study.settings.name, self.study.sha256)
 
     async def _fill(self):
         store = await self.open()

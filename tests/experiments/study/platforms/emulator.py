@@ -1,6 +1,5 @@
 """A platform that plays one of those from which people come: pages and an API over real HTTP, with faults on demand."""
 
-import asyncio
 import socket
 import threading
 from collections import deque
@@ -71,7 +70,8 @@ class Emulator:
                 await self._app(scope, receive, _nowhere)
             if kind == "hang":
                 self.stuck.set()
-                await asyncio.sleep(PATIENCE)
+                while (await receive())["type"] != "http.disconnect":  # until who asked gives up
+                    pass
             status, text = (500, "trouble") if kind == "500" else (200, "<html>")
             await PlainTextResponse(text, status)(scope, receive, send)
 

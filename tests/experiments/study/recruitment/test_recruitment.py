@@ -1,6 +1,7 @@
 """Platforms: who comes, who is recognised, and where people are sent back to."""
 
 import dataclasses
+import functools
 import logging
 import sqlite3
 import time
@@ -98,10 +99,8 @@ def test_no_form_is_sent_where_a_link_says(change):
 
 
 def test_who_comes_again_is_the_same_person_and_no_id_is_shown(tmp_path, caplog):
-    study = read_people_study(FOLDER / "paper.toml")
-    settings = msgspec.structs.replace(study.settings, recruitment=PROLIFIC, minimum={})
     caplog.set_level(logging.INFO)
-    with serving(tmp_path, dataclasses.replace(study, settings=settings)) as client:
+    with serving(tmp_path, with_recruitment(PROLIFIC)) as client:
         assert client.get("/").status_code == 400, "without ids"
         text = client.get("/", params=IDS).text
         assert all(f'name="{name}" value="{value}"' in text for name, value in IDS.items())
@@ -123,8 +122,13 @@ def test_who_comes_again_is_the_same_person_and_no_id_is_shown(tmp_path, caplog)
     assert not any(value in shown for value in IDS.values())
 
 
+@functools.cache
+def paper():
+    return read_people_study(FOLDER / "paper.toml")
+
+
 def with_recruitment(recruitment, **limits):
-    study = read_people_study(FOLDER / "paper.toml")
+    study = paper()
     settings = msgspec.structs.replace(study.settings, recruitment=recruitment, minimum={})
     limits = msgspec.structs.replace(settings.limits, **limits)
     return dataclasses.replace(study, settings=msgspec.structs.replace(settings, limits=limits))

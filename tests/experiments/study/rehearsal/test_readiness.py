@@ -168,6 +168,14 @@ class _Sloppy(FormPhase):
         return Done({})
 
 
+@pytest.fixture
+def quick(monkeypatch, house):
+    """Nobody plays a trial or waits long in the queue, and the house is there."""
+    monkeypatch.setattr(SimulatedPerson, "_play", _play_nothing)
+    monkeypatch.setattr("experiments.study.rehearsal.person.QUEUE_PAUSE", 0.1)
+    monkeypatch.setattr(runs.House, "load", lambda _: house)
+
+
 def _walked(study, folder, monkeypatch, phases=None):
     pictures = []
 
@@ -182,8 +190,8 @@ def _walked(study, folder, monkeypatch, phases=None):
     return walked, pictures
 
 
+@pytest.mark.usefixtures("quick")
 def test_a_dry_run_goes_every_way_that_there_is(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(SimulatedPerson, "_play", _play_nothing)
     walked, pictures = _walked(study, tmp_path, monkeypatch)
     (unplayed,) = walked.faults
     assert "the run that was recorded cannot be used" in unplayed
@@ -224,8 +232,8 @@ async def _play_nothing(self, trial, leaves):  # noqa: ARG001 - everybody stays
         'platform = "lab"',
     ],
 )
+@pytest.mark.usefixtures("quick")
 def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
-    monkeypatch.setattr(SimulatedPerson, "_play", _play_nothing)
     phases = 'phases = ["consent", "task", "debriefing", "completion"]'
     changed = with_text(
         tmp_path,
@@ -237,8 +245,10 @@ def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
     assert [fault for fault in walked.faults if "cannot be used" not in fault] == []
 
 
-def test_a_dry_run_finds_a_phase_that_takes_anything(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(SimulatedPerson, "_play", _play_nothing)
+@pytest.mark.usefixtures("quick")
+def test_a_dry_run_finds_a_phase_that_takes_anything(tmp_path, monkeypatch):
+    short = 'minutes = 10\nphases = ["consent", "task", "survey", "completion"]'
+    study = with_text(tmp_path, phases=("minutes = 10", short), minimum=("story = 20", ""))
     phases = [
         _Sloppy(plan_of(study), "survey") if p.name == "survey" else p for p in phases_of(plan_of(study))
     ]

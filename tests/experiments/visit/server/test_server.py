@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scripted_workers import ORIGIN, ScriptedPool, connected, play_trial, started, until
 from starlette.testclient import TestClient
+from study_database import new_database
 from study_site import MadeInItsLoop
 
 from experiments.errors import StoreError
@@ -26,7 +27,7 @@ DEVICE = {"frames_per_s": "60", "latency_ms": "40", "width": "1280", "height": "
 DEVICE |= {"keyboard": "yes", "webgl": "yes", "renderer": "a card"}
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def study():
     study = read_people_study(FOLDER / "paper.toml")
     return dataclasses.replace(study, settings=msgspec.structs.replace(study.settings, minimum={}))
@@ -36,9 +37,10 @@ def study():
 def serving(folder, study):
     film = folder / "film.mp4"
     film.write_bytes(b"a film")
+    url = new_database(folder / "study.db")
 
     async def make():
-        store = await Store.open(f"sqlite:///{folder / 'study.db'}", "study", "0" * 64)
+        store = await Store.open(url, "study", "0" * 64)
         folders, rng = VisitFolders(folder / "visits"), np.random.default_rng(0)
         procedure = Procedure(plan_of(study, film), store, folders, rng)
         return VisitServer(procedure, ScriptedPool(), ServerOptions(b"secret", workers=20)).app("127.0.0.1")

@@ -2,11 +2,13 @@
 
 import asyncio
 import uuid
+from pathlib import Path
 
 import pytest
 from database_servers import SERVERS, MissingProgramError
 from sqlalchemy import make_url, text
 from sqlalchemy.ext.asyncio import create_async_engine
+from study_database import new_database
 
 from experiments.visit.store import Store
 from experiments.visit.store.engine import DRIVERS
@@ -74,9 +76,14 @@ async def _create(server, name):
 
 
 @pytest.fixture
-async def store(url):
+def with_tables(url):
+    return new_database(Path(make_url(url).database)) if url.startswith("sqlite:") else url
+
+
+@pytest.fixture
+async def store(with_tables):
     """An open store, in which hashing a password takes little memory and so little time."""
-    opened = await Store.open(url, "pilot", HASH, password_memory_kib=64)
+    opened = await Store.open(with_tables, "pilot", HASH, password_memory_kib=64)
     yield opened
     await opened.close()
 

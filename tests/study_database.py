@@ -1,0 +1,29 @@
+"""New databases of studies as copies of one, because making the tables takes longer than many tests."""
+
+import asyncio
+import functools
+import tempfile
+from pathlib import Path
+
+from experiments.visit.store.engine import Database
+from experiments.visit.store.upgrade import upgrade
+
+
+def new_database(path):
+    """URL of a database, which is made with all tables and nobody in it unless it is there; not in an event loop."""
+    if not path.exists():
+        path.write_bytes(_tables())
+    return f"sqlite:///{path}"
+
+
+@functools.cache
+def _tables():
+    async def make(file):
+        database = Database(f"sqlite:///{file}")
+        await upgrade(database)
+        await database.close()
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "study.db"
+        asyncio.run(make(file))
+        return file.read_bytes()
