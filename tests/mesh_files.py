@@ -71,7 +71,7 @@ def _table():
 
 def _many_parts():
     rng = np.random.default_rng(3)
-    pieces = [_moved(_MAKE.icosphere(1, 0.02), *(0.12 * rng.random(3) * (1, 1, 0.4))) for _ in range(30)]
+    pieces = [_moved(_MAKE.icosphere(1, 0.02), *(0.12 * rng.random(3) * (1, 1, 0.4))) for _ in range(12)]
     return trimesh.util.concatenate(pieces)
 
 
