@@ -68,7 +68,9 @@ def walked(house, tmp_path_factory):
     return out
 
 
-@pytest.mark.parametrize("seconds", [0.6, 1.1, 1.6])
+@pytest.mark.parametrize(
+    "seconds", [0.6, *(pytest.param(later, marks=pytest.mark.slow) for later in (1.1, 1.6))]
+)
 def test_a_replay_that_films_names_the_signal_that_stops_it(seconds, walked, tmp_path, capsys):
     stop = threading.Timer(seconds, os.kill, (os.getpid(), signal.SIGTERM))
     stop.start()
