@@ -121,28 +121,30 @@ def cast(parts, origins, direction):
 
     Back faces are not seen; what is translucent is taken as opaque.
     """
-    nearest, colours = np.full(len(origins), np.inf), np.full((len(origins), 3), np.nan)
     across = np.linalg.svd(direction[None])[2][1:]  # two axes of the plane that the rays cross
-    rays, start = origins @ across.T, origins @ direction
+    order = np.argsort(origins @ across[0])  # so that those near a triangle lie beside each other
+    rays, start = origins[order] @ across.T, origins[order] @ direction
+    nearest, colours = np.full(len(origins), np.inf), np.full((len(origins), 3), np.nan)
     for part in parts:
-        corners = part.positions[part.triangles]
-        flat, along = corners @ across.T, corners @ direction
-        low, high = flat.min(axis=1) - 1e-9, flat.max(axis=1) + 1e-9
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        for number in np.flatnonzero(normals @ direction < 0):
-            near = np.flatnonzero(((rays >= low[number]) & (rays <= high[number])).all(axis=1))
-            sides = flat[number, 1:] - flat[number, 0]
-            second, third = np.linalg.solve(sides.T, (rays[near] - flat[number, 0]).T)
-            shares = np.stack((1 - second - third, second, third), axis=1)
-            depth = shares @ along[number] - start[near]
-            seen = (shares >= -1e-9).all(axis=1) & (depth < nearest[near])
-            near, shares, triangle = near[seen], shares[seen], part.triangles[number]
-            nearest[near] = depth[seen]
-            colour = shares @ part.colours[triangle][:, :3]
-            if part.image is not None:
-                colour = colour * sampled(part.image, shares @ part.uv[triangle])
-            colours[near] = colour
-    return colours
+        a, b, c = np.moveaxis(part.positions[part.triangles], 1, 0)
+        triangles = part.triangles[np.cross(b - a, c - a) @ direction < 0]
+        flat, along = part.positions[triangles] @ across.T, part.positions[triangles] @ direction
+        first = np.searchsorted(rays[:, 0], flat[..., 0].min(axis=1) - 1e-9)
+        last = np.searchsorted(rays[:, 0], flat[..., 0].max(axis=1) + 1e-9)
+        inverse = np.linalg.inv(flat[:, 1:] - flat[:, :1])
+        hit, shares = np.full(len(rays), -1), np.empty((len(rays), 3))
+        for number, near in enumerate(map(slice, first, last)):
+            second, third = ((rays[near] - flat[number, 0]) @ inverse[number]).T
+            here = np.stack((1 - second - third, second, third), axis=1)
+            depth = here @ along[number] - start[near]
+            seen = (here >= -1e-9).all(axis=1) & (depth < nearest[near])
+            nearest[near][seen], hit[near][seen], shares[near][seen] = depth[seen], number, here[seen]
+        corners, shares = triangles[hit[hit >= 0]], shares[hit >= 0, None]
+        colour = (shares @ part.colours[corners][..., :3])[:, 0]
+        if part.image is not None:
+            colour = colour * sampled(part.image, (shares @ part.uv[corners])[:, 0])
+        colours[hit >= 0] = colour
+    return colours[np.argsort(order)]
 
 
 def sampled(image, uv):

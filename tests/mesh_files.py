@@ -71,7 +71,7 @@ def _table():
 
 def _many_parts():
     rng = np.random.default_rng(3)
-    pieces = [_moved(_MAKE.icosphere(1, 0.02), *(0.12 * rng.random(3) * (1, 1, 0.4))) for _ in range(30)]
+    pieces = [_moved(_MAKE.icosphere(1, 0.02), *(0.12 * rng.random(3) * (1, 1, 0.4))) for _ in range(12)]
     return trimesh.util.concatenate(pieces)
 
 
@@ -203,6 +203,10 @@ def _frame(across, along, bar):
     return _less(_MAKE.box((across, along, bar)), _MAKE.box((across - 2 * bar, along - 2 * bar, 1)))
 
 
+def _ring(radius, thickness):
+    return _MAKE.torus(radius, thickness, major_sections=16, minor_sections=8)
+
+
 def _hollow_box():
     return _less(_MAKE.box((0.2, 0.15, 0.1)), _moved(_MAKE.box((0.19, 0.14, 0.1)), 0, 0, 0.005))
 
@@ -231,9 +235,9 @@ def _plate():
 
 # No hand reaches into their middle: name -> what builds them.
 HOLLOW = {
-    "ring": lambda: _MAKE.torus(0.08, 0.02),
+    "ring": lambda: _ring(0.08, 0.02),
     "wire_ring": lambda: _MAKE.torus(0.1, 0.003, minor_sections=16),
-    "ring_on_edge": lambda: _turned(_MAKE.torus(0.08, 0.02)),
+    "ring_on_edge": lambda: _turned(_ring(0.08, 0.02)),
     "letter_l": lambda: trimesh.util.concatenate(
         [_MAKE.box((0.03, 0.2, 0.03)), _moved(_MAKE.box((0.17, 0.03, 0.03)), 0.1, -0.085, 0)]
     ),
@@ -244,7 +248,7 @@ HOLLOW = {
     "frame": lambda: _frame(0.25, 0.2, 0.02),
     "hollow_box": _hollow_box,
     "basket": _basket,
-    "handle": lambda: _less(_MAKE.torus(0.1, 0.01), _moved(_MAKE.box((1, 1, 1)), 0, -0.5, 0)),
+    "handle": lambda: _less(_ring(0.1, 0.01), _moved(_MAKE.box((1, 1, 1)), 0, -0.5, 0)),
     "arch": lambda: _less(_MAKE.box((0.25, 0.08, 0.13)), _moved(_MAKE.box((0.2, 1, 0.13)), 0, 0, 0.03)),
 }
 

@@ -32,26 +32,28 @@ def check_kept(house, out, fault):
     assert replay(out, house=house).ended == "error"
 
 
-@pytest.mark.parametrize("after", [0, 1, 40])
+FAULTS = [
+    ("1 / 0", "raised ZeroDivisionError: division by zero"),
+    ("raise KeyError('x')", "raised KeyError"),
+    ("raise SystemExit(3)", "raised SystemExit"),
+    ("os._exit(0)", "raised SystemExit"),
+    ("return None", "answered None"),
+    ("return 'left'", "answered 'left'"),
+    ("raise type('Odd', (BaseException,), {})()", "raised Odd"),
+    ("raise type('Mute', (Exception,), {'__str__': None})()", "raised Mute"),
+    ("return type('Mute', (), {'__repr__': None})()", "answered a Mute"),
+    ("return Move(forward=float('nan'))", "raised Move.forward must be a finite number"),
+    ("return Pick(object=5)", "raised the name of an object must be printable text"),
+    ("return Pick(object='a\\ud800')", "raised the name of an object must be printable text"),
+    ("return FollowPath([[0, 0], [0, float('nan')]], (0, 0), 0.1)", "must be finite numbers"),
+    ("return FollowPath([[0, 0]], None, 0.1)", "raised the goal of a path must have the shape"),
+    ("return Wait(until=float('nan'))", "raised Wait.until must be a time or None"),
+]
+
+
 @pytest.mark.parametrize(
-    ("fault", "said"),
-    [
-        ("1 / 0", "raised ZeroDivisionError: division by zero"),
-        ("raise KeyError('x')", "raised KeyError"),
-        ("raise SystemExit(3)", "raised SystemExit"),
-        ("os._exit(0)", "raised SystemExit"),
-        ("return None", "answered None"),
-        ("return 'left'", "answered 'left'"),
-        ("raise type('Odd', (BaseException,), {})()", "raised Odd"),
-        ("raise type('Mute', (Exception,), {'__str__': None})()", "raised Mute"),
-        ("return type('Mute', (), {'__repr__': None})()", "answered a Mute"),
-        ("return Move(forward=float('nan'))", "raised Move.forward must be a finite number"),
-        ("return Pick(object=5)", "raised the name of an object must be printable text"),
-        ("return Pick(object='a\\ud800')", "raised the name of an object must be printable text"),
-        ("return FollowPath([[0, 0], [0, float('nan')]], (0, 0), 0.1)", "must be finite numbers"),
-        ("return FollowPath([[0, 0]], None, 0.1)", "raised the goal of a path must have the shape"),
-        ("return Wait(until=float('nan'))", "raised Wait.until must be a time or None"),
-    ],
+    ("after", "fault", "said"),
+    [(1, *case) for case in FAULTS] + [(after, *case) for after in (0, 40) for case in FAULTS[::4]],
 )
 def test_a_participant_that_fails(after, fault, said, house, tmp_path, own_module):
     own_module(participant(fault, after))
@@ -92,7 +94,7 @@ def test_a_condition_that_fails_ends_the_run_though_nobody_looks(fault, said, ho
 def test_numbers_and_lists_of_numpy_can_be_shown(house, tmp_path, own_module):
     marker = "Marker('box', np.zeros(3), [np.float32(1)] * 3, (1, 1, 1, 1), 'mine')"
     own_module(condition(f"return replace(state, markers=[{marker}])", 0))
-    run(house, tmp_path / "out", assistance="own_code:hud_state", user="searcher")
+    run(house, tmp_path / "out", assistance="own_code:hud_state", user="searcher", time_limit=2.0)
 
 
 @pytest.mark.parametrize("hang", ["time.sleep(600)", "[0 for _ in iter(int, 1)]"])

@@ -9,11 +9,12 @@ from user_code import participant, planner
 from faults.conftest import FAST, PROBLEM
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("statement", "number"),
     [
         ("import ctypes; ctypes.string_at(0)", signal.SIGSEGV),
-        pytest.param("os.abort()", signal.SIGABRT, marks=pytest.mark.slow),
+        ("os.abort()", signal.SIGABRT),
     ],
 )
 def test_a_run_whose_participant_crashes_names_it(statement, number, tmp_path, mjsim, own_module):
@@ -33,6 +34,7 @@ def test_a_planner_that_crashes_says_where(tmp_path, mjsim, own_module):
     assert 'own_code.py", line' in done.stderr
 
 
+@pytest.mark.slow
 def test_a_planner_whose_module_leaves_is_named(tmp_path, mjsim, own_module):
     own_module("import os; os._exit(0)")
     (tmp_path / "problem.json").write_text(json.dumps(PROBLEM))

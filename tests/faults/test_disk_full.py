@@ -50,6 +50,7 @@ def test_a_run_on_a_full_disk_is_kept_elsewhere(size, house, small_disk, tmp_pat
     assert list(disk.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_full_disk_costs_the_video_alone(house, small_disk):
     """The video is by far the largest file."""
     disk, warnings = small_disk("120k"), []

@@ -29,6 +29,7 @@ def test_what_draws_nothing_needs_no_opengl(choice, tmp_path, mjsim):
     assert read_json(tmp_path / "out" / records.METRICS)["ended"] == "all delivered"
 
 
+@pytest.mark.slow
 def test_a_command_starts_no_other_process_for_opengl(tmp_path):
     """As GLFW does when it is imported: a signal to the group of processes would make those print tracebacks."""
     (tmp_path / "own.py").write_text(
@@ -62,6 +63,7 @@ def test_a_run_without_opengl_keeps_its_record(choice, tmp_path, mjsim):
     assert not (tmp_path / "film.mp4").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("choice", "advice"), [("foo", "unset MUJOCO_GL"), ("osmesa", "apt-get install")])
 def test_the_doctor_says_what_to_do(choice, advice, mjsim):
     done = mjsim("doctor", MUJOCO_GL=choice)
@@ -69,6 +71,7 @@ def test_the_doctor_says_what_to_do(choice, advice, mjsim):
     assert advice in done.stdout.splitlines()[-1]
 
 
+@pytest.mark.slow
 def test_the_doctor_works_where_mujoco_does_not(tmp_path, mjsim):
     (tmp_path / "mujoco.py").write_text("raise ImportError('libmujoco.so is damaged')")
     done = mjsim("doctor", PYTHONPATH=f"{tmp_path}")
@@ -98,8 +101,9 @@ def opengl_error():
     return GLError(12302)
 
 
-@pytest.mark.parametrize("error", [opengl_error, lambda: mujoco.FatalError("gladLoadGL error")])
-@pytest.mark.parametrize("uses", [0, 20])
+@pytest.mark.parametrize(
+    ("uses", "error"), [(20, opengl_error), (0, lambda: mujoco.FatalError("gladLoadGL error"))]
+)
 def test_a_driver_that_fails_late_costs_the_pictures_alone(
     uses, error, house, tmp_path, tmp_path_factory, monkeypatch
 ):

@@ -46,7 +46,6 @@ def attempt(tmp_path):
         (lambda: Path("there").unlink(), "", "lost there"),
         (lambda: (write("new"), refuse()), "", "half-written new"),
         (lambda: write(f"{WORK}1"), "", f"half-written {WORK}1"),
-        (lambda: time.sleep(60), "", "hang"),
         (lambda: [0 for _ in iter(int, 1)], "", "hang"),
         (lambda: print("mjsim: " + "long " * 1000) or refuse(), "", "refused at length"),
     ],
@@ -55,6 +54,11 @@ def test_what_is_wrong_is_found(call, must, fault, attempt, monkeypatch):
     monkeypatch.setattr(warm_commands, "CPU_LIMIT", 1)
     monkeypatch.setattr(warm_commands, "WALL_LIMIT", 3)
     assert attempt(Case("any", "kind", must=must, call=call)).fault == fault
+
+
+def test_who_sleeps_hangs(attempt, monkeypatch):
+    monkeypatch.setattr(warm_commands, "WALL_LIMIT", 0.5)
+    assert attempt(Case("any", "kind", call=lambda: time.sleep(60))).fault == "hang"
 
 
 def test_a_reason_is_asked_for(attempt):

@@ -15,7 +15,7 @@ from experiments.record import records
 from experiments.record.files import read_json
 from experiments.record.records import read_events
 from experiments.record.writer import RecordWriter
-from experiments.session.signals import CHECK_TIMEOUT_S, Stopped, signals_postponed, signals_raised
+from experiments.session.signals import Stopped, signals_postponed, signals_raised
 from experiments.trials.replay.replay import replay
 from experiments.trials.trial import run_trial
 from faults.conftest import BRIEF, FAST, ROOT, one_line
@@ -55,10 +55,11 @@ def test_signals_are_no_exceptions_while_a_record_is_saved():
         time.sleep(1)
 
 
-def test_who_does_not_look_is_interrupted_after_a_while():
+def test_who_does_not_look_is_interrupted_after_a_while(monkeypatch):
+    monkeypatch.setattr("experiments.session.signals.CHECK_TIMEOUT_S", 0.2)
     with pytest.raises(Stopped), signals_postponed():
         os.kill(os.getpid(), signal.SIGHUP)
-        time.sleep(CHECK_TIMEOUT_S + 5)
+        time.sleep(10)
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +69,9 @@ def walked(house, tmp_path_factory):
     return out
 
 
-@pytest.mark.parametrize("seconds", [0.6, 1.1, 1.6])
+@pytest.mark.parametrize(
+    "seconds", [0.6, *(pytest.param(later, marks=pytest.mark.slow) for later in (1.1, 1.6))]
+)
 def test_a_replay_that_films_names_the_signal_that_stops_it(seconds, walked, tmp_path, capsys):
     stop = threading.Timer(seconds, os.kill, (os.getpid(), signal.SIGTERM))
     stop.start()

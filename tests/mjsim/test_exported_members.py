@@ -78,6 +78,7 @@ def test_gymnasium_finds_the_environment_by_its_module_in_any_order_of_import(im
     assert made == "mjsim/Rearrange-v0"
 
 
+@pytest.mark.slow
 def test_the_readme_runs_as_it_stands_and_needs_mjsim_alone():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     code = readme.split("```python\n")[1].split("```")[0]

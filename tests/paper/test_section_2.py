@@ -96,7 +96,7 @@ def test_another_feasible_visit_is_replanned_for(own_way):
 
 
 def test_or_tools_solves_it(house):
-    played = play(house, "optimal", planner="ortools", objects=4)
+    played = play(house, "optimal", planner="ortools", objects=2)
     assert {event["status"] for event in played.of("plan")} <= {"optimal", "feasible"}
     assert played.events[-1]["reason"] == "all delivered"
 

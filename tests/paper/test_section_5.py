@@ -221,7 +221,7 @@ def test_under_optimal_the_list_is_the_plan_and_done_steps_are_crossed_out(own_w
 
 @pytest.mark.parametrize(("assistance", "told"), [("none", False), ("highlight", False), ("guided", True)])
 def test_replanning_is_announced_where_the_plan_is_shown_and_only_there(house, assistance, told):
-    played = play(house, assistance, user="boltzmann:30", objects=4)
+    played = play(house, assistance, user="boltzmann:30", objects=3)
     assert len(played.of("plan")) > 1
     texts = {state.message.text for _, state in played.shown if state.message is not None}
     assert (UPDATED in texts) == told

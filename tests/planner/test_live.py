@@ -183,7 +183,7 @@ def test_a_session_continues_while_every_proof_is_stuck(house, monkeypatch):
         return held + one_after_another(*range(n))(problem)
 
     log, planner = EventLog(), Script(in_turn, in_turn)
-    config = TrialConfig(objects=6, assistance="highlight", seed=3, live=True, regret=False)
+    config = TrialConfig(objects=6, assistance="highlight", seed=3, live=True, regret=False, fidelity="event")
     scene = compose(house.sample_episode(objects=6, seed=3), house.catalogue)
     planner.go.set()  # let the plan of the familiarisation finish
     monkeypatch.setattr(setup, "planner_named", lambda _: planner)
@@ -204,7 +204,19 @@ def test_a_session_continues_while_every_proof_is_stuck(house, monkeypatch):
 def test_the_command_line_runs_live_and_its_replay_shows_the_logged_plans(tmp_path, monkeypatch):
     """The replay must not call the planner, which might plan differently."""
     run = str(tmp_path / "run")
-    options = ["--objects", "16", "--seed", "4", "--user", "boltzmann:20", "--time-limit", "14", "--no-video"]
+    options = [
+        "--objects",
+        "16",
+        "--seed",
+        "4",
+        "--user",
+        "boltzmann:20",
+        "--time-limit",
+        "14",
+        "--no-video",
+        "--fidelity",
+        "event",
+    ]
     assert main(["run", "--live", *options, "--assistance", "optimal-regret", "--out", run]) == 0
     metrics = json.loads((tmp_path / "run" / records.METRICS).read_text())
     assert metrics["live"] is True

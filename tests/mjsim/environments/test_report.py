@@ -93,6 +93,7 @@ def test_dm_control_may_be_missing_where_it_cannot_be_installed_like_the_others(
     assert advise(report.versions, (), GPU) == ("dm-control is missing: pip install dm-control",)
 
 
+@pytest.mark.slow
 def test_doctor_imports_what_it_lists(tmp_path):
     """Shapely before 2.0.6 is installed next to numpy 2 without complaint and cannot be imported."""
     (tmp_path / "shapely").mkdir()
@@ -123,6 +124,7 @@ def _command_line(words, path):
     )
 
 
+@pytest.mark.slow
 def test_doctor_names_a_distribution_that_hides_packages(tmp_path):
     _install_fake(tmp_path, "planner", "hud")
     done = _command_line("doctor", f"{tmp_path}:{CHECKOUT}")
@@ -134,6 +136,7 @@ def test_doctor_names_a_distribution_that_hides_packages(tmp_path):
         )
 
 
+@pytest.mark.slow
 def test_doctor_names_a_distribution_that_hides_nothing_yet(tmp_path):
     _install_fake(tmp_path, "hud")
     done = _command_line("doctor", f"{CHECKOUT}:{tmp_path}")

@@ -15,6 +15,13 @@ def look() -> Appearance:
     return draw_appearance(PALETTE, np.random.default_rng(0))
 
 
+@pytest.fixture(scope="module", params=sorted(KINDS))
+def pieces(request: pytest.FixtureRequest, look: Appearance) -> list[tuple[Piece, mujoco.MjModel]]:
+    """Pieces of one kind, large and small, each with its model."""
+    made = [make(request.param, look, seed, smaller=seed % 3) for seed in range(4)]
+    return [(piece, compiled(piece, look)) for piece in made]
+
+
 def make(kind: str, look: Appearance, seed: int, smaller: int = 0) -> Piece:
     return KINDS[kind].make(np.random.default_rng(seed), look, smaller=smaller)
 
@@ -39,11 +46,9 @@ def test_there_are_sixty_kinds() -> None:
     assert len(KINDS) >= 60
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS))
-def test_a_piece_compiles_and_stays_within_its_size(kind: str, look: Appearance) -> None:
-    for seed in range(4):
-        piece = make(kind, look, seed, smaller=seed % 3)
-        low, high = extents(compiled(piece, look))
+def test_a_piece_compiles_and_stays_within_its_size(pieces: list[tuple[Piece, mujoco.MjModel]]) -> None:
+    for piece, model in pieces:
+        low, high = extents(model)
         w, d, h = piece.size
         assert low[:, 2].min() > -0.01
         assert low[:, 0].min() > -w / 2 - SLACK and high[:, 0].max() < w / 2 + SLACK
@@ -52,18 +57,15 @@ def test_a_piece_compiles_and_stays_within_its_size(kind: str, look: Appearance)
                 low[:, 1].min() > (-0.08 if piece.stands == "recess" else -SLACK)
                 and high[:, 1].max() < d + SLACK
             )
-        assert high[:, 2].max() < max(h, 2.6 if "dining" in kind else 0) + SLACK
+        assert high[:, 2].max() < max(h, 2.6 if "dining" in piece.kind else 0) + SLACK
         for part in piece.parts:
             x0, y0, x1, y1 = part.spot
             assert -w / 2 - 1e-6 <= x0 < x1 <= w / 2 + 1e-6 and -1e-6 <= y0 < y1 <= d + 1e-6
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS))
-def test_what_collides_is_within_the_parts(kind: str, look: Appearance) -> None:
+def test_what_collides_is_within_the_parts(pieces: list[tuple[Piece, mujoco.MjModel]]) -> None:
     """Ways are looked for around the parts: nothing that stands in a way may be outside of them."""
-    for seed in range(4):
-        piece = make(kind, look, seed)
-        model = compiled(piece, look)
+    for piece, model in pieces:
         low, high = extents(model)
         solid = [g for g in range(model.ngeom) if model.geom_type[g] != mujoco.mjtGeom.mjGEOM_PLANE]
         for k, geom in enumerate(solid):
@@ -76,7 +78,7 @@ def test_what_collides_is_within_the_parts(kind: str, look: Appearance) -> None:
                     for box in boxes
                 )
                 or len(boxes) > 1
-            ), (kind, seed, low[k], high[k])
+            ), (low[k], high[k])
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))

@@ -92,6 +92,7 @@ def test_kernels_work_where_nothing_can_be_cached(tmp_path):
     assert kernels.kernel(function)(2) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kept", [True, False])
 def test_compiling_is_announced_once(tmp_path, kept):
     """No user may take a first command for one that hangs, or an unwritable cache for a cost that is paid once."""

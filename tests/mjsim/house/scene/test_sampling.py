@@ -108,6 +108,7 @@ def test_seeds_and_blocks_differ(episodes):
     assert len(blocks) > 1
 
 
+@pytest.mark.slow
 def test_same_seed_same_episode_in_another_process(episodes, tmp_path):
     code = (
         "import hashlib; from experiments.house import House\n"

@@ -29,14 +29,19 @@ def imported(tmp_path, source, **options):
     return {d.what: f"{d.choice}: {d.reason}" for d in decisions}, Catalogue.load(str(out))
 
 
-@pytest.fixture(scope="module")
-def flat(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("flat")
+def write_flat(folder):
+    """A flat, a part of which fell through the floor."""
     lost = (
         "<model name='lost'><pose>1 1 -7e8 0 0 0</pose><link name='l'><visual name='v'><geometry><box>"
         "<size>1 1 1</size></box></geometry></visual></link></model>"
     )
-    return imported(folder, write_sdf(folder, extra=lost))
+    return write_sdf(folder, extra=lost)
+
+
+@pytest.fixture(scope="module")
+def flat(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flat")
+    return imported(folder, write_flat(folder))
 
 
 def test_an_sdf_world_becomes_a_house(flat):
@@ -95,24 +100,13 @@ def test_what_one_bumps_into_is_below_a_table_only_where_its_legs_are(flat):
     assert 3 <= len(tall) <= 40
 
 
-def test_the_same_scene_gives_the_same_bytes(tmp_path):
+def test_the_same_scene_gives_the_same_bytes(flat, tmp_path):
+    _, again = imported(tmp_path, write_flat(tmp_path))
     written = []
-    for name in ("one", "two"):
-        (tmp_path / name).mkdir()
-        source = write_sdf(tmp_path / name)
-        import_house(source, tmp_path / name / "out", HouseOptions())
-        files = sorted(p for p in (tmp_path / name / "out").rglob("*") if p.is_file())
-        written.append({str(p.relative_to(tmp_path / name)): p.read_bytes() for p in files})
+    for catalogue in (flat[1], again):
+        folder = catalogue.house_path.parent
+        written.append({p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()})
     assert written[0] == written[1]
-
-
-def test_rooms_can_be_given(tmp_path):
-    rooms = tmp_path / "rooms.toml"
-    rooms.write_text(
-        '[rooms.den]\nlabel = "Den"\nboxes = [[0, 0, 3.9, 5]]\n[rooms.hall]\nlabel = "Hall"\nboxes = [[4, 0, 8, 5]]\n'
-    )
-    _, catalogue = imported(tmp_path, write_sdf(tmp_path), rooms=rooms)
-    assert dict(catalogue.rooms) == {"den": "Den", "hall": "Hall"}
 
 
 def test_without_walls_the_house_is_the_rectangle_of_its_floor(tmp_path):
@@ -121,11 +115,16 @@ def test_without_walls_the_house_is_the_rectangle_of_its_floor(tmp_path):
     assert len(catalogue.rooms) == 1
 
 
-def test_the_command_imports_and_reports(tmp_path, capsys):
-    out = tmp_path / "my house"
-    assert cli.main(["import", "house", str(write_sdf(tmp_path)), "--out", str(out), "--name", "Flat"]) == 0
+def test_the_command_imports_and_reports_and_takes_rooms_and_a_name(tmp_path, capsys):
+    rooms, out = tmp_path / "rooms.toml", tmp_path / "my house"
+    rooms.write_text(
+        '[rooms.den]\nlabel = "Den"\nboxes = [[0, 0, 3.9, 5]]\n[rooms.hall]\nlabel = "Hall"\nboxes = [[4, 0, 8, 5]]\n'
+    )
+    words = ["import", "house", write_sdf(tmp_path), "--out", out, "--name", "Flat", "--rooms", rooms]
+    assert cli.main([str(word) for word in words]) == 0
     assert "convex geoms" in capsys.readouterr().out
     assert tomllib.loads((out / "catalogue.toml").read_text())["house"]["label"] == "Flat"
+    assert dict(Catalogue.load(str(out)).rooms) == {"den": "Den", "hall": "Hall"}
     assert json.loads((out / "report.json").read_text())[0]["what"] == "source"
 
 
@@ -137,23 +136,18 @@ def colliding(house, name):
     return points.min(axis=0), points.max(axis=0)
 
 
-def test_gltf_and_obj_give_the_same_floor(tmp_path):
-    area = []
+def test_gltf_and_obj_give_the_same_floor_and_an_obj_tells_its_unit_and_axes(tmp_path):
+    said = {}
     for name, write in (("glb", write_glb), ("obj", write_obj)):
         folder = tmp_path / name
         folder.mkdir()
-        decisions, catalogue = imported(folder, write(folder / f"flat.{name}"))
-        area.append(decisions["outline"])
+        said[name], catalogue = imported(folder, write(folder / f"flat.{name}"))
         assert len(catalogue.rooms) == 2
         bounds = compiled_house(catalogue).rooms.bounds
         np.testing.assert_allclose(np.diff(np.reshape(bounds, (2, 2)), axis=0)[0], (8, 5), atol=0.35)
-    assert area[0] == area[1]
-
-
-def test_an_obj_scene_tells_its_unit_and_axes(tmp_path):
-    decisions, _ = imported(tmp_path, write_obj(tmp_path / "flat.obj"))
-    assert decisions["up"].startswith("y")
-    assert decisions["unit"].startswith("cm")
+    assert said["glb"]["outline"] == said["obj"]["outline"]
+    assert said["obj"]["up"].startswith("y")
+    assert said["obj"]["unit"].startswith("cm")
 
 
 def test_a_closed_box_in_centimetres_is_a_room(tmp_path):
@@ -267,15 +261,15 @@ def test_a_damaged_world_is_refused_by_its_cause_and_nothing_is_written(tmp_path
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("broken", [False, True])
-def test_what_is_missing_is_left_out_if_the_user_says_so(tmp_path, broken):
-    source = write_sdf(tmp_path, extra="" if broken else INCLUDE)
-    if broken:
-        (tmp_path / "models" / "table" / "meshes" / "table.obj").write_text("v 0 0 0")
-    with pytest.raises(AssetError, match="no triangles" if broken else "--skip-missing"):
+def test_what_is_missing_is_left_out_if_the_user_says_so(tmp_path):
+    source, table = write_sdf(tmp_path, extra=INCLUDE), tmp_path / "models" / "table" / "meshes" / "table.obj"
+    with pytest.raises(AssetError, match="--skip-missing"):
+        import_house(source, tmp_path / "house", HouseOptions())
+    table.write_text("v 0 0 0")
+    with pytest.raises(AssetError, match="no triangles"):
         import_house(source, tmp_path / "house", HouseOptions())
     decisions, _ = imported(tmp_path, source, skip_missing=True)
-    assert ("table.obj" if broken else "model://chair") in decisions["left out"]
+    assert "table.obj" in decisions["left out"] and "model://chair" in decisions["left out"]
 
 
 def test_what_is_missing_is_the_first_cause_of_a_refusal(tmp_path):

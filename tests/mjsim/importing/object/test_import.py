@@ -152,7 +152,7 @@ def valid(suffix):
     return content.encode() if isinstance(content, str) else content
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(data=st.data(), suffix=st.sampled_from([".glb", ".obj", ".stl", ".ply"]))
 def test_damaged_files_are_imported_or_refused(data, suffix, tmp_path_factory):
     content = bytearray(valid(suffix))
@@ -291,7 +291,8 @@ def test_parts_cover_the_body(tmp_path):
 
 
 def test_a_ball_in_a_wire_ring_stays_and_collides(tmp_path):
-    pieces = [MAKE.torus(0.11, 0.004), MAKE.icosphere(2, 0.04)]
+    ring = MAKE.torus(0.11, 0.004, major_sections=24, minor_sections=8)
+    pieces = [ring, MAKE.icosphere(1, 0.04)]
     item = take(tmp_path, trimesh.util.concatenate(pieces))
     assert np.ptp(item.visual.vertices[:, 2]) == pytest.approx(0.08, abs=0.002)
     assert item.size[2] > 0.078
@@ -417,14 +418,13 @@ def test_four_that_fit_by_volume_but_not_beside_each_other_are_refused(tmp_path,
     assert run(*words, "--scale", re.search(r"--scale ([\d.]+)", line)[1]) == 0
 
 
-OTHER_SIZES = ((0.26, 0.1, 0.1), (0.12, 0.12, 0.17))
+OTHER_SIZES = ((0.26, 0.2, 0.04), (0.26, 0.1, 0.1), (0.12, 0.12, 0.17))
 
 
 @pytest.mark.parametrize(
     "size",
     [
         (0.25, 0.13, 0.11),
-        (0.26, 0.2, 0.04),
         *(pytest.param(size, marks=pytest.mark.slow) for size in OTHER_SIZES),
     ],
 )
