@@ -111,6 +111,12 @@ def frequent_checkpoints():
 
 
 @pytest.fixture
+def undrawn(monkeypatch):
+    """Figures of reports stay empty, as drawing them takes longer than the statistics."""
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda _, file, **__: file.write("<svg></svg>"))
+
+
+@pytest.fixture
 def step_singly():
     """Makes a world take one control step per action, as for a viewer."""
 

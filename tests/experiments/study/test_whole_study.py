@@ -90,7 +90,7 @@ def test_the_file_of_init_goes_through_all_commands(tmp_path, study, capsys):
     served, rehearsal, table = (tmp_path / name for name in ("served", "rehearsal", "table"))
     moving = film(tmp_path / "film.mp4")
     assert main(["study", "check", str(study)]) == 0, capsys.readouterr().out
-    rehearse = ["study", "rehearse", str(study), "--people", "4", "--dropouts", "0", "--per-minute", "30"]
+    rehearse = ["study", "rehearse", str(study), "--people", "2", "--dropouts", "0", "--per-minute", "30"]
     assert main([*rehearse, "--film", str(moving), "--out", str(rehearsal)]) == 0, capsys.readouterr().out
     assert (rehearsal / "analysis" / "report.html").is_file()
     serve = [
@@ -106,13 +106,13 @@ def test_the_file_of_init_goes_through_all_commands(tmp_path, study, capsys):
         "--no-open",
     ]
     start_once([sys.executable, "-m", "experiments.cli.main", *serve])
-    gone = asyncio.run(take_part(study, served, moving, 4))
-    assert [(one.outcome, one.faults) for one in gone] == [("finished", [])] * 4
+    gone = asyncio.run(take_part(study, served, moving, 2))
+    assert [(one.outcome, one.faults) for one in gone] == [("finished", [])] * 2
     names = [str(study), str(served)]
     assert main(["study", "collect", *names, "--out", str(table)]) == 0
     assert main(["study", "analyze", str(table), "--exclude", str(study)]) == 0, capsys.readouterr().err
     assert main(["study", "export", *names, "--out", str(tmp_path / "export")]) == 0
     assert main(["study", "pay", *names]) == 0
-    assert "30.00 USD are owed in 4 of 4 payments" in capsys.readouterr().out
+    assert "15.00 USD are owed in 2 of 2 payments" in capsys.readouterr().out
     paid = ["--paid", "p00001-reward", "--reference", "receipt", "--rehearsal", str(rehearsal)]
     assert main(["study", "pay", *names, *paid]) == 0

@@ -335,6 +335,7 @@ def test_a_changed_preregistration_is_refused(study, tmp_path, change, message):
         read_preregistration(path)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_survey_of_ones_own_is_frozen_and_named_in_the_report(study, tmp_path, capsys):
     own = tmp_path / "own.toml"
     own.write_text(FILE.read_text().replace("[likert]", '[likert]\nease = "Felt at ease"'))
@@ -354,6 +355,7 @@ def test_a_survey_of_ones_own_is_frozen_and_named_in_the_report(study, tmp_path,
     assert "own.toml" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_commands_say_who_is_left_out_and_what_departs(study, tmp_path, capsys):
     rows = of_measures(people_as_planned(), "nd_feasible", "ipl_locations", "completion_time_s")
     rows[1]["completion_time_s"], rows[2]["ipl_locations"] = 900.0, float("inf")

@@ -210,6 +210,7 @@ def own_study(tmp_path):
     return read_people_study(path)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_items_and_scale_of_ones_own_are_analysed_and_preregistered(tmp_path, own_study, capsys):
     assert survey_of(own_study).items == {"calm": "I felt calm.", "useful": "It helped."}
     frozen, table = str(tmp_path / "frozen.zip"), tmp_path / "table"
@@ -232,6 +233,7 @@ def test_items_and_scale_of_ones_own_are_analysed_and_preregistered(tmp_path, ow
     assert "likert_calm has the answer 8; answers are whole numbers from 1 to 7" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("column", "fault"), [("display_frames_per_s", None), ("display_frames", "no column 'display_frames'")]
 )
