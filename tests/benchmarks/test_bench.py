@@ -96,7 +96,7 @@ def test_latencies_where_no_frame_comes_are_infinite_and_fail(monkeypatch):
 
 
 def test_a_generated_home_is_measured_without_a_fault():
-    row = home_figures.figures((3, 50_000))
+    row = home_figures.figures((1, 50_000))
     assert not [key for key in houses.FAULTS if row.get(key)]
     assert row["kinds"]["toilet"] == 1
     assert all(figure([row]) >= 0 for figure, *_ in houses.REQUIREMENTS.values())

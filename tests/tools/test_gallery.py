@@ -4,12 +4,14 @@ import itertools
 
 import cv2
 import numpy as np
+import pytest
 
 from experiments.cli.main import main
 from experiments.trials.floor_plan import PLANNED, house_picture
 from tools.gallery import SITUATIONS, contact_sheet
 
 
+@pytest.mark.slow
 def test_the_four_levels_are_one_house_and_the_first_has_its_way(house, tmp_path):
     """Objects cover ever more of the house, which is the same; the dashed way is in the first picture alone."""
     assert main(["gallery", "levels", "--out", str(tmp_path)]) == 0

@@ -234,6 +234,7 @@ def test_a_copy_of_an_environment_continues_as_the_original_does(easy, duplicate
     assert duplicate(dm).step(PICK).observation["gps"].tolist() == dm.step(PICK).observation["gps"].tolist()
 
 
+@pytest.mark.slow
 def test_vectors_agree(easy):
     """The second of two environments in this process does as one in another process, with the next seed."""
     logs, plans = [], np.array([[FORWARD, PICK], [PICK, PLACE], [PLACE, FORWARD]])

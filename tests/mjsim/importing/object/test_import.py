@@ -36,17 +36,20 @@ from mjsim.values.errors import AssetError, RenderError
 from mjsim.values.options import WorldOptions
 
 MAKE = trimesh.creation
+WRITE_PREVIEW = "mjsim.importing.object.mesh_import.write_preview"
 
 
 @pytest.fixture(scope="module")
 def imported(tmp_path_factory):
-    """The apartment with all mesh files imported, and the report of each."""
+    """The apartment with all mesh files imported, without their pictures, and the report of each."""
     folder = tmp_path_factory.mktemp("imported")
     reports = {}
-    for name, mesh in MESHES.items():
-        extension = HouseExtension(folder / "house")
-        entry = CatalogueEntry.named(name, mesh.category)
-        reports[name] = add_mesh(mesh.write(folder, name), extension, entry, mesh.options)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(WRITE_PREVIEW, lambda *_: None)
+        for name, mesh in MESHES.items():
+            extension = HouseExtension(folder / "house")
+            entry = CatalogueEntry.named(name, mesh.category)
+            reports[name] = add_mesh(mesh.write(folder, name), extension, entry, mesh.options)
     return HouseExtension(folder / "house"), reports
 
 
@@ -460,6 +463,7 @@ def test_a_surface_that_cuts_itself_is_known_and_does_not_take_minutes(tmp_path)
 @pytest.mark.parametrize("force", [False, True])
 def test_a_failure_while_installing_leaves_all_as_it_was(tmp_path, monkeypatch, force):
     own = tmp_path / "own"
+    monkeypatch.setattr(WRITE_PREVIEW, lambda *_: None)
     add(tmp_path, own, "first")
     if force:
         add(tmp_path, own)
@@ -513,7 +517,7 @@ def test_without_opengl_an_object_is_imported_without_its_picture(tmp_path, monk
     def fail(*_):
         raise RenderError("no OpenGL")
 
-    monkeypatch.setattr("mjsim.importing.object.mesh_import.write_preview", fail)
+    monkeypatch.setattr(WRITE_PREVIEW, fail)
     assert report(add(tmp_path, tmp_path / "own"), "preview") == "none: no OpenGL"
     written = json.loads((tmp_path / "own/brick/report.json").read_text(encoding="utf-8"))
     assert written[-1]["reason"] == "no OpenGL"
@@ -526,7 +530,8 @@ def test_without_the_extra_the_command_says_what_to_install(tmp_path, monkeypatc
     assert "no_such_library: pip install 'mjsim[import]'" in said and said.count("\n") == 1
 
 
-def test_a_catalogue_extends_one_that_extends_another(tmp_path):
+def test_a_catalogue_extends_one_that_extends_another(tmp_path, monkeypatch):
+    monkeypatch.setattr(WRITE_PREVIEW, lambda *_: None)
     add(tmp_path, tmp_path / "a", "Red brick")
     second = HouseExtension(tmp_path / "b", str(tmp_path / "a" / "catalogue.toml"))
     found = add_mesh(brick(tmp_path), second, CatalogueEntry.named("Green brick", "books"), ImportOptions())
