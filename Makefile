@@ -17,7 +17,7 @@ demo: $(READY) ## Set up, simulate an assisted clean-up into runs/demo, then fil
 	$(BIN)/mjsim replay runs/demo --video runs/demo.mp4 --force
 
 test: $(READY) ## Set up, then run the tests but for the slow ones; COVERAGE=1 measures what they cover
-	$(BIN)/python -m pytest -n $(WORKERS) $(if $(COVERAGE),--cov --cov-report=term:skip-covered --cov-fail-under=0)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(if $(COVERAGE),--cov --cov-report=term:skip-covered --cov-fail-under=0)
 
 test-slow: $(READY) ## Run the slow tests; COVERAGE=1 adds to what `make test` measured, and checks the sum
 	$(BIN)/python -m pytest -n $(WORKERS) --maxschedchunk=1 -m slow $(if $(COVERAGE),--cov --cov-append --cov-report=term:skip-covered)

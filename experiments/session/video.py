@@ -3,6 +3,7 @@
 import hashlib
 import queue
 import threading
+from collections.abc import Iterator
 from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
@@ -69,14 +70,19 @@ class VideoWriter:
             raise RecordError(f"cannot encode {self._path}: {self._failure}") from self._failure
 
     def _encode(self) -> None:
+        frames = self._frames()
         try:
-            self._encode_all()
+            self._encode_all(frames)
         except BaseException as failure:  # raised again later, in the thread that adds frames
             self._failure = failure
-            while self._queue.get() is not None:
+            for _ in frames:
                 pass
 
-    def _encode_all(self) -> None:
+    def _frames(self) -> Iterator[Image]:
+        while (frame := self._queue.get()) is not None:
+            yield frame
+
+    def _encode_all(self, frames: Iterator[Image]) -> None:
         height, width, _ = self._shape
         # faststart puts the index first, so that a browser can play the file while loading it.
         with av.open(str(self._path), "w", options={"movflags": "+faststart"}) as container:
@@ -87,7 +93,7 @@ class VideoWriter:
             stream.width, stream.height = width, height
             stream.pix_fmt = "yuv420p"
             stream.time_base = Fraction(1, self._fps)
-            while (frame := self._queue.get()) is not None:
+            for frame in frames:
                 self._hash.update(np.ascontiguousarray(frame).data)
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
             container.mux(stream.encode())

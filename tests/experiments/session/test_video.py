@@ -1,5 +1,8 @@
 """The video plays in browsers, holds every frame, and repeats byte for byte."""
 
+import threading
+from contextlib import contextmanager, suppress
+
 import av
 import numpy as np
 import pytest
@@ -62,3 +65,27 @@ def test_an_encoder_failure_reaches_the_caller(tmp_path):
         for image in frames(40):
             video.write(image)
         video.close()
+
+
+def test_a_failure_while_the_file_is_completed_reaches_the_caller(tmp_path, monkeypatch):
+    """As on a disk that is full by then."""
+    opened, failures = av.open, []
+
+    @contextmanager
+    def full(*args, **options):
+        with opened(*args, **options) as container:
+            yield container
+        raise OSError(28, "No space left on device")
+
+    def close():
+        with suppress(RecordError):
+            video.close()
+            return
+        failures.append("raised")
+
+    monkeypatch.setattr(av, "open", full)
+    video = VideoWriter(tmp_path / "v.mp4", width=160, height=120)
+    closing = threading.Thread(target=close, daemon=True)
+    closing.start()
+    closing.join(30.0)
+    assert failures == ["raised"], "it does not wait for ever"
