@@ -8,6 +8,8 @@ import sys
 
 # Before NumPy is loaded: on small matrices, threads of OpenBLAS cost more than they gain.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Before Numba is loaded: colours of its messages would take standard output away from a test in which it compiles.
+os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
 
 import pytest
 from hypothesis import settings
