@@ -16,11 +16,11 @@ demo: $(READY) ## Set up, simulate an assisted clean-up into runs/demo, then fil
 	@echo "Look at runs/demo/topdown.png while the film is made."
 	$(BIN)/mjsim replay runs/demo --video runs/demo.mp4 --force
 
-test: $(READY) ## Set up, then run the tests but for the slow ones; COVERAGE=1 measures what they cover
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(if $(COVERAGE),--cov --cov-report=term:skip-covered --cov-fail-under=0)
+test: $(READY) ## Set up, then run the tests except for the slow ones; COVERAGE=1 checks how many lines they run
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(if $(COVERAGE),--cov --cov-report=term:skip-covered)
 
-test-slow: $(READY) ## Run the slow tests; COVERAGE=1 adds to what `make test` measured, and checks the sum
-	$(BIN)/python -m pytest -n $(WORKERS) --maxschedchunk=1 -m slow $(if $(COVERAGE),--cov --cov-append --cov-report=term:skip-covered)
+test-slow: $(READY) ## Run the slow tests
+	$(BIN)/python -m pytest -n $(WORKERS) --maxschedchunk=1 -m slow
 
 check: check-client site ## Lint, strict types, import contracts, security, the site
 	$(BIN)/ruff check .
