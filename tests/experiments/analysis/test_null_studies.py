@@ -13,7 +13,7 @@ from experiments.analysis.statistics.models import diagnose, ordinal_model
 from experiments.analysis.statistics.pairs import compare_pairs
 from studies.score_rules import _below, _trend
 
-STUDIES = 5000
+STUDIES = 3000
 CELLS = [cell for cell, count in SIZES.items() for _ in range(count)]
 assistance, objects = (np.array([cell[k] for cell in CELLS]) for k in (0, 1))
 HOUSES = np.arange(447) % 7
@@ -59,11 +59,11 @@ def test_with_unequal_variances_only_tests_that_allow_them_keep_5_percent():
     """One condition varies twice as much; it has the smallest cells. Within three standard errors of 1,000 studies."""
     spread = np.where(assistance == "highlight", 2.0, 1.0)
     hits = {}
-    for seed in range(STUDIES // 5):
+    for seed in range(STUDIES // 3):
         rng = np.random.default_rng(seed)
         for name, p in p_values(rng.normal(size=447) * spread, rng):
             hits[name] = hits.get(name, 0) + (p < 0.05)
-    rates = {name: count / (STUDIES // 5) for name, count in hits.items()}
+    rates = {name: count / (STUDIES // 3) for name, count in hits.items()}
     robust = [name for name in rates if name.startswith(("welch", "Welch", "HC3", "games"))]
     assert {name: rates[name] for name in robust if not abs(rates[name] - 0.05) < 0.021} == {}
     assert rates["Type III, interaction"] > 0.08 < rates["mixed, interaction"]
