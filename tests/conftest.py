@@ -23,7 +23,7 @@ from mjsim.house.scene.scene import compose
 from planner.navmesh import NavMesh
 
 # Whether a test passes must not depend on how busy the machine is.
-settings.register_profile("unhurried", deadline=None, max_examples=30)
+settings.register_profile("unhurried", deadline=None)
 settings.load_profile("unhurried")
 
 

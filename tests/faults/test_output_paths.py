@@ -70,9 +70,8 @@ def nothing_is_computed(monkeypatch):
     def fail(*_args, **_options):
         pytest.fail("computed before it was known where to write")
 
-    monkeypatch.setattr(
-        "experiments.cli.plan.solver", fail
-    )  # imports it, before the next line changes its origin
+    # Imports the module, before the origin of `solver` is changed below.
+    monkeypatch.setattr("experiments.cli.plan.solver", fail)
     for name in ("experiments.house.House.load", "tools.gallery.take_pictures", "planner.solvers.solver"):
         monkeypatch.setattr(name, fail)
     monkeypatch.setattr("experiments.trials.replay.replay.replay", fail)

@@ -83,7 +83,7 @@ def damaged(draw, content, another):
 
 
 @pytest.mark.slow
-@settings(max_examples=30)
+@settings(max_examples=60)
 @given(st.sampled_from(FILES), st.booleans(), st.data())
 def test_every_damage_is_noticed(run, other, house, tmp_path_factory, name, resummed, data):
     """Also where the checksums are written anew, but for pictures: only their checksums are claimed."""

@@ -88,7 +88,7 @@ def layout(state, size, *, beside=False):
 
 
 @pytest.mark.slow
-@settings(max_examples=30, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+@settings(max_examples=60, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(states(), st.sampled_from(FRAMES))
 def test_panels_are_disjoint_inside_the_frame_and_leave_the_view_free(state, size):
     found = layout(state, size)
@@ -112,7 +112,7 @@ def test_panels_are_disjoint_inside_the_frame_and_leave_the_view_free(state, siz
 BESIDE = {"checklist", "bins", "progress", "clock", "inventory", "minimap"}  # never over the picture
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(states(), st.integers(312, 1200), st.floats(1.0, 2.4))
 def test_lists_lie_beside_a_picture_with_margins(state, height, aspect):
     width = max(416, round(height * aspect))
@@ -123,7 +123,7 @@ def test_lists_lie_beside_a_picture_with_margins(state, height, aspect):
         assert not overlap(found.panels[name], picture), name
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(states(), st.integers(360, 1200), st.floats(1.5, 2.4))
 def test_panels_of_a_wide_frame_cover_nothing_but_its_border(state, height, aspect):
     width = max(640, round(height * aspect))
@@ -184,7 +184,7 @@ def test_words_and_decimals_are_apart_in_the_smallest_frame(face, gap):
     assert typeface.width(f"2{gap}2", face) >= np.ptp(apart)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(states(), st.sampled_from(FRAMES))
 def test_the_current_row_is_shown_and_texts_stay_in_their_rows(state, size):
     found = layout(state, size)

@@ -31,7 +31,7 @@ def claim(plan, lower_bound):
     return dataclasses.replace(plan, lower_bound=lower_bound, status=status, certificate=None)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     n=st.integers(5, 8),
@@ -56,7 +56,7 @@ def test_no_true_proof_is_refused_and_no_derived_bound_is_above_the_optimum(
             assert derived + allowance(problem, plan) >= plan.certificate.root * plan.certificate.unit > 0.0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(6, 7), capacity=CAPACITIES, resolution=RESOLUTIONS)
 def test_a_bound_above_the_optimum_is_refused_up_to_seven_objects(seed, n, capacity, resolution):
     """The bound is rejected only if rounding cannot explain the excess."""

@@ -68,7 +68,7 @@ def test_around_a_pillar_the_path_is_two_tangents_and_an_arc():
     assert len(path.points) > 3
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=seeds)
 def test_distances_equal_those_over_all_vertices_without_pruning(seed):
     field = random_field(seed, 6)
@@ -78,7 +78,7 @@ def test_distances_equal_those_over_all_vertices_without_pruning(seed):
     np.testing.assert_allclose(Geodesics(mesh).distances(points), expected, atol=1e-9)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=seeds)
 def test_distances_are_a_metric_and_paths_have_their_length(seed):
     mesh = NavMesh.build(random_field(seed), BOUNDS, agent_radius=0.2)
@@ -140,7 +140,7 @@ def test_no_points_no_distances():
     assert geodesics.distances_from((1, 1), np.empty((0, 2))).shape == (0,)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seeds)
 def test_a_point_that_is_navigable_by_tolerance_only_is_as_far_as_the_one_beside_it(seed):
     mesh = NavMesh.build(random_field(seed), BOUNDS, agent_radius=0.1)

@@ -204,19 +204,8 @@ def test_a_session_continues_while_every_proof_is_stuck(house, monkeypatch):
 def test_the_command_line_runs_live_and_its_replay_shows_the_logged_plans(tmp_path, monkeypatch):
     """The replay must not call the planner, which might plan differently."""
     run = str(tmp_path / "run")
-    options = [
-        "--objects",
-        "16",
-        "--seed",
-        "4",
-        "--user",
-        "boltzmann:20",
-        "--time-limit",
-        "14",
-        "--no-video",
-        "--fidelity",
-        "event",
-    ]
+    options = ["--objects", "16", "--seed", "4", "--user", "boltzmann:20", "--time-limit", "14"]
+    options += ["--no-video", "--fidelity", "event"]
     assert main(["run", "--live", *options, "--assistance", "optimal-regret", "--out", run]) == 0
     metrics = json.loads((tmp_path / "run" / records.METRICS).read_text())
     assert metrics["live"] is True

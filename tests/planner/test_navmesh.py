@@ -70,7 +70,7 @@ def test_snap_is_the_nearest_point_of_a_face():
     assert np.array_equal(mesh.snap((3.0, 0.5)), (3.0, 0.5))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(field=fields, point=st.tuples(st.floats(-1, 5), st.floats(-1, 5)))
 def test_nothing_navigable_is_nearer_than_the_snapped_point(field, point):
     mesh = NavMesh.build(field, BOUNDS, agent_radius=0.2, resolution=0.1)
@@ -93,7 +93,7 @@ def island_by_polygons(mesh, points):
 
 
 @pytest.mark.slow
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(field=fields, seed=st.integers(0, 2**32 - 1), resolution=st.sampled_from((0.03, 0.1, 0.45)))
 def test_the_grid_answers_as_the_polygons_do(field, seed, resolution):
     mesh = NavMesh.build(field, BOUNDS, agent_radius=0.2, resolution=resolution)
@@ -124,7 +124,7 @@ def test_many_samples_are_those_of_many_calls():
     assert one.random() == many.random()
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(field=fields, seed=st.integers(0, 2**32 - 1))
 def test_samples_are_navigable_and_keep_their_distance(field, seed):
     mesh = NavMesh.build(field, BOUNDS, agent_radius=0.2)

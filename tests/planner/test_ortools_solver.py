@@ -16,7 +16,7 @@ from planner.solvers import SolveLimit, solver
 seeds = st.integers(0, 2**32 - 1)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     seed=seeds,
     shipments=st.integers(0, 3),

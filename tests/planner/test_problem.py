@@ -79,7 +79,7 @@ def test_wrong_plans_are_refused_by_name(changes, capacity, fault):
         check(problem(capacity=capacity), dataclasses.replace(GOOD, **changes))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_integer_distances_are_a_metric_close_to_the_real_one(seed):
     points = np.random.default_rng(seed).uniform(0, 10, (12, 2))

@@ -27,7 +27,7 @@ def expected(problem):
 
 
 @pytest.mark.slow
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     seed=seeds, n=st.integers(0, 5), onboard=st.integers(0, 2), coincide=st.booleans(), table=st.booleans()
 )

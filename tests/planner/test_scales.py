@@ -50,7 +50,7 @@ def no_metric(seed, n, capacity, spread):
     return RoutingProblem(d + d.T, 0, shipments, (), capacity)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     seed=seeds,
     n=st.integers(0, 5),
@@ -78,14 +78,14 @@ def test_no_planner_is_wrong_about_itself_at_odd_scales(name, scale):
         check(problem, plan)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(seed=seeds, n=st.integers(1, 3), capacity=st.integers(1, 3), spread=st.sampled_from([0.5, 3, 12]))
 def test_plans_in_distances_of_mixed_magnitudes_are_true(seed, n, capacity, spread):
     problem = no_metric(seed, n, capacity, spread)
     assert_true(problem, TABLE.solve(problem))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=seeds, gap=st.sampled_from([1e-3, 1e-6, 1e-8]), scale=st.sampled_from(SCALES))
 def test_of_two_tours_that_nearly_tie_the_shorter_is_taken(seed, gap, scale):
     """One object is on each side of the start. The slightly nearer one must be picked up first."""

@@ -19,7 +19,7 @@ from tests.planning_cases import optimum, random_problem
 SEARCH = ExactSolver(table_bytes=0)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     n=st.integers(0, 13),

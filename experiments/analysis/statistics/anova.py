@@ -192,7 +192,7 @@ def two_way_squares(
     kind: int = 2,
     effects: Iterable[str] = EFFECTS,
 ) -> dict[str, float]:
-    """Return the sum of squares of each of `effects`. The other arguments are those of `two_way`."""
+    """Return the sum of squares for each effect in `effects`. The other arguments are those of `two_way`."""
     return _squares(_crossed(values, first, second), kind, effects)
 
 

@@ -125,7 +125,7 @@ def unread_note(columns: Sequence[str], measures: Measures) -> list[str]:
 
 
 def resolve(measure: Measure, known: Collection[str]) -> str | None:
-    """Return the first column of a measure that contains values, or None if there is none."""
+    """Return the first column of a measure that contains values, or None if all are empty."""
     return next((c for c in (measure.column, measure.without) if c is not None and c in known), None)
 
 

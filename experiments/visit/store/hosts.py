@@ -49,7 +49,7 @@ class Hosts(StorePart):
         may = [person.c.host == name]
         if journal:
             may += [person.c.host.is_(None), person.c.host == HANDED_OVER]
-        elif new:  # the journals of a participant with a place are on another host
+        elif new:  # a participant who has a place has journals on another host
             may += [person.c.host.is_(None) & ~exists().where(assignment.c.person_id == person.c.id)]
 
         async def work(connection: AsyncConnection) -> bool:

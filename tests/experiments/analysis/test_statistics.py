@@ -314,13 +314,13 @@ def test_the_mixed_model_of_a_published_example():
 def test_the_interval_of_the_share_of_houses_holds_the_true_one(share):
     rng, held = np.random.default_rng(4), 0
     houses, condition = np.repeat(np.arange(20), 6), np.tile([*"ab"], 60)
-    for _ in range(100):
+    for _ in range(200):
         values = rng.normal(0, math.sqrt(share), 20)[houses] + rng.normal(0, math.sqrt(1 - share), 120)
         house = mixed_model(values, condition, np.full(120, 6), {"house": houses}).random["house"]
         low, high = house.interval
         assert 0 <= low <= house.share <= high <= 1
         held += low <= share <= high
-    assert 0.91 <= held / 100 <= (1.0 if share == 0 else 0.99)
+    assert 0.91 <= held / 200 <= (1.0 if share == 0 else 0.99)
 
 
 @pytest.mark.parametrize(

@@ -238,16 +238,8 @@ def test_a_replay_works_out_anew_what_was_seen(session, house, monkeypatch):
 
 def test_a_session_takes_the_place_of_one_before_only_with_force(tmp_path):
     words = ["run", "--objects", "1", "--fidelity", "event", "--no-video", "--no-floor-plan"]
-    words += [
-        "--phases",
-        "training,task",
-        "--training-assistance",
-        "optimal",
-        "--time-limit",
-        "1",
-        "--out",
-        str(tmp_path / "run"),
-    ]
+    words += ["--phases", "training,task", "--training-assistance", "optimal", "--time-limit", "1"]
+    words += ["--out", str(tmp_path / "run")]
     assert main(words) == 0
     assert main(words) == 2
     assert main([*words, "--force"]) == 0

@@ -10,7 +10,7 @@ from hud.markers import NAVY, WHITE, YELLOW
 from mjsim.generator.palette import surfaces
 from mjsim.render.markers import LINES, blend_hidden, outline_hidden
 
-HOMES = 50
+HOMES = 200
 SHADES = (1.0, 0.75, 0.5, 0.25)  # light that reaches a wall
 LEAST = 3.0  # contrast of WCAG 2.2, 1.4.11
 
@@ -48,7 +48,7 @@ def behind(wall, colour):
     return frame
 
 
-def test_a_pole_behind_any_wall_of_50_homes_has_an_outline_of_3_to_1(walls):
+def test_a_pole_behind_any_wall_of_200_homes_has_an_outline_of_3_to_1(walls):
     assert len(walls) >= HOMES * len(SHADES)
     for wall in walls:
         assert max(contrast(line, np.round(wall)) for line in LINES) >= LEAST

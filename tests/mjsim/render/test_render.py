@@ -261,7 +261,7 @@ def test_unusable_markers_are_named(room, renderer):
     assert not red(renderer.rgb(room[1], "ahead")).any()  # a refused frame leaves nothing behind
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(0.05, 20)),
     st.floats(0.01, 2.0),

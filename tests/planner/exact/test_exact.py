@@ -45,7 +45,7 @@ def test_a_narrow_search_claims_no_more_than_it_knows(seed, n, width, rows):
         assert integer_length(problem, plan) == integer_length(problem, optimum)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=seeds, n=st.integers(4, 9), width=st.integers(1, 20), rows=st.integers(1, 100))
 def test_a_pass_that_drops_states_bounds_the_optimum_from_both_sides(seed, n, width, rows):
     problem = random_problem(seed, n, seed % 3)
@@ -127,7 +127,7 @@ def dropped_every_way(instance, order):
     return best
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=seeds, n=st.integers(0, 5), onboard=st.integers(0, 2), bins=st.integers(1, 4))
 def test_drops_of_a_pick_order_are_decoded_optimally(seed, n, onboard, bins):
     problem = random_problem(seed, n, onboard, bins=bins)

@@ -28,7 +28,7 @@ def instance_of(seed, n, onboard, bins, coincide):
     return make_instance(problem, problem.integers.metric)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=60, deadline=None)
 @cases
 def test_numpy_and_the_kernels_fill_in_and_follow_the_same(seed, n, onboard, bins, coincide):
     instance = instance_of(seed, n, onboard, bins, coincide)

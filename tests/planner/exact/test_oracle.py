@@ -85,7 +85,7 @@ def assert_optimal(problem, planner, length):
     return plan
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), capacity=st.integers(1, 2))
 def test_any_problem_is_solved_to_the_optimum(seed, capacity):
     problem = grid_problem(np.random.default_rng(seed), 6, capacity)

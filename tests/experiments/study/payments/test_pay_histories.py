@@ -59,7 +59,7 @@ def person(number, status, phase):
     return PersonRow(number, f"{number:064}", "link", status, phase, NOON, NOON, delete_wanted=False)
 
 
-@settings(max_examples=100)
+@settings(max_examples=300)
 @given(people=HISTORIES, rules=st.lists(RULES, min_size=DECISIONS, max_size=DECISIONS))
 def test_each_person_gets_what_the_rules_said_first(people, rules):
     """Rules change between decisions, and so may how people stand; no person gets two payments of those given once."""

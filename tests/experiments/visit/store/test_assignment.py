@@ -45,9 +45,9 @@ async def test_each_place_has_its_house_and_each_person_an_order(arrive, assign)
     assert len({one.order_seed for one in given} | {one.person_seed for one in given}) == 10
 
 
-async def test_150_at_once_from_two_connections_get_a_place_of_their_own(store, url, arrive, assign):
-    cells = [CellQuota(10, range(10))] * 12  # 120 places
-    people = await asyncio.gather(*(arrive(number) for number in range(150)))
+async def test_500_at_once_from_two_connections_get_a_place_of_their_own(store, url, arrive, assign):
+    cells = [CellQuota(33, range(33))] * 12  # 396 places
+    people = await asyncio.gather(*(arrive(number) for number in range(500)))
     other = await Store.open(url, "pilot", "0" * 64)
     try:
         sides = (store, other)
@@ -56,8 +56,8 @@ async def test_150_at_once_from_two_connections_get_a_place_of_their_own(store, 
         )
     finally:
         await other.close()
-    assert places(given) == [(cell, place) for cell in range(12) for place in range(10)]
-    assert given.count(None) == 30
+    assert places(given) == [(cell, place) for cell in range(12) for place in range(33)]
+    assert given.count(None) == 104
 
 
 async def test_full_cells_give_no_place_until_somebody_leaves(store, arrive, assign):

@@ -54,7 +54,7 @@ def finished_by_cell(rule, seed, abandoned_after):
 
 
 def spread(rule, abandoned_after):
-    return np.mean([finished_by_cell(rule, seed, abandoned_after) for seed in range(20)])
+    return np.mean([finished_by_cell(rule, seed, abandoned_after) for seed in range(50)])
 
 
 def test_balanced_assignment_with_release_differs_by_at_most_3_over_cells():

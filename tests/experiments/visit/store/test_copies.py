@@ -86,7 +86,7 @@ async def test_a_backup_is_of_one_moment_while_people_go_on(store, tmp_path, arr
 
 
 async def test_a_backup_overwrites_nothing_and_a_damaged_one_is_refused(store, tmp_path, arrive, other_url):
-    for number in range(60):
+    for number in range(200):
         await arrive(number)
     backup = tmp_path / "backup.db"
     await store.backup(backup)

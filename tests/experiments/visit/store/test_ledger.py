@@ -144,7 +144,7 @@ STEPS = st.lists(
 
 
 @given(steps=STEPS)
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 async def test_whatever_happens_everybody_is_paid_exactly_once(url, steps):
     number = next(NUMBERS)
     store = await Store.open(url, f"study {number}", "0" * 64)

@@ -39,11 +39,11 @@ async def test_those_without_a_sign_of_life_time_out(store, arrive):
     assert statuses == ["timed_out", "arrived", "finished"]
 
 
-async def test_150_arrivals_at_once_of_75_people_make_75(store, arrive):
-    people = await asyncio.gather(*(arrive(number, key=f"{number // 2:064x}") for number in range(150)))
-    assert len({person.id for person in people}) == 75
-    assert sum(person.returning for person in people) == 75
-    assert len(await store.people()) == 75
+async def test_500_arrivals_at_once_of_250_people_make_250(store, arrive):
+    people = await asyncio.gather(*(arrive(number, key=f"{number // 2:064x}") for number in range(500)))
+    assert len({person.id for person in people}) == 250
+    assert sum(person.returning for person in people) == 250
+    assert len(await store.people()) == 250
 
 
 async def test_keys_that_differ_in_case_alone_are_two_people(arrive):

@@ -88,7 +88,7 @@ def test_the_house_is_searched_in_two_thirds_of_the_tests(catalogue):
     assert counts[1] < 0.67 * counts[0]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.integers(1, 60), st.integers(0, 2**31))
 def test_every_box_is_one_leaf_and_lies_in_all_nodes_above(count, seed):
     rng = np.random.default_rng(seed)

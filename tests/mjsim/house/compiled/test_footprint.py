@@ -52,7 +52,7 @@ def check_convex(polygon):
     assert math.isclose(shapely.Polygon(polygon).area, shapely.Polygon(polygon).convex_hull.area)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     kind=st.sampled_from(["sphere", "capsule", "ellipsoid", "cylinder", "box"]),
     turn=st.tuples(*[st.integers(-9, 9)] * 4).filter(any),

@@ -155,7 +155,7 @@ def valid(suffix):
     return content.encode() if isinstance(content, str) else content
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(data=st.data(), suffix=st.sampled_from([".glb", ".obj", ".stl", ".ply"]))
 def test_damaged_files_are_imported_or_refused(data, suffix, tmp_path_factory):
     content = bytearray(valid(suffix))

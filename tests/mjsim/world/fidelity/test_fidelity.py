@@ -208,7 +208,7 @@ def floor(house_model):
 @given(
     speed=st.floats(1.0, 8.0), agility=st.floats(1.0, 60.0), seed=st.integers(0, 2**32 - 1), start=st.integers(0, 9)
 )  # fmt: skip
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_nobody_walks_into_or_through_a_wall(house, floor, house_footprint, speed, agility, seed, start):
     """Against the outlines of the apartment as polygons of another library: never nearer than the trunk is wide."""
     obstacles = shapely.union_all([shapely.Polygon(p) for p in house_footprint.obstacles])
@@ -230,7 +230,7 @@ def test_nobody_walks_into_or_through_a_wall(house, floor, house_footprint, spee
 
 
 @given(points=st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=1, max_size=30))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_the_gap_to_an_outline_is_that_of_geometry(points):
     corners = np.array([[-0.3, -0.2], [0.4, -0.1], [0.2, 0.5], [-0.1, 0.4]])
     polygon = shapely.Polygon(corners)
