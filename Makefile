@@ -6,7 +6,7 @@ READY  := $(VENV)/.ready
 WORKERS ?= auto
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow check check-client format site wheel-check compatibility constraints assets pictures data-dictionary client-protocol clean
+.PHONY: help demo test test-slow test-long check check-client format site wheel-check compatibility constraints assets pictures data-dictionary client-protocol clean
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -19,8 +19,11 @@ demo: $(READY) ## Set up, simulate an assisted clean-up into runs/demo, then fil
 test: $(READY) ## Set up, then run the tests except for the slow ones; COVERAGE=1 checks how many lines they run
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(if $(COVERAGE),--cov --cov-report=term:skip-covered)
 
-test-slow: $(READY) ## Run the slow tests
-	$(BIN)/python -m pytest -n $(WORKERS) --maxschedchunk=1 -m slow
+test-slow: $(READY) ## Run the slow tests, each of which takes seconds
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup -m 'slow and not long'
+
+test-long: $(READY) ## Run the long tests, each of which takes about a minute or more
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup -m long
 
 check: check-client site ## Lint, strict types, import contracts, security, the site
 	$(BIN)/ruff check .

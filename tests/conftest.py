@@ -15,6 +15,7 @@ import pytest
 from hypothesis import settings
 
 from experiments.house import House
+from experiments.trials.fingerprint import plugin_digest
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.footprint import footprint
 from mjsim.house.compiled.house import compiled_house
@@ -97,6 +98,7 @@ def own_module(tmp_path, monkeypatch):
         (tmp_path / f"{name}.py").write_text(text)
         monkeypatch.syspath_prepend(str(tmp_path))
         monkeypatch.delitem(sys.modules, name, raising=False)
+        plugin_digest.cache_clear()  # it may be known from a module of that name in another test
         return name
 
     yield write

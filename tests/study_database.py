@@ -3,6 +3,7 @@
 import asyncio
 import functools
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from experiments.visit.store.engine import Database
@@ -10,7 +11,7 @@ from experiments.visit.store.upgrade import upgrade
 
 
 def new_database(path):
-    """URL of a database, which is made with all tables and nobody in it unless it is there; not in an event loop."""
+    """URL of a database, which is made with all tables and nobody in it unless it is there."""
     if not path.exists():
         path.write_bytes(_tables())
     return f"sqlite:///{path}"
@@ -25,5 +26,6 @@ def _tables():
 
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "study.db"
-        asyncio.run(make(file))
+        with ThreadPoolExecutor(1) as thread:  # a test that drives a browser has an event loop in its own
+            thread.submit(asyncio.run, make(file)).result()
         return file.read_bytes()

@@ -104,6 +104,7 @@ def test_a_generated_home_is_measured_without_a_fault():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_grown_records_are_the_trials_of_their_design(tmp_path, capsys):
     """A batch of them has nothing left to run, and their people all have a row."""
     assert main(["bench", "growth", "--quick", "--count", "40", "--out", str(tmp_path), "--json"]) == 0

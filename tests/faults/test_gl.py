@@ -101,6 +101,7 @@ def opengl_error():
     return GLError(12302)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("uses", "error"), [(20, opengl_error), (0, lambda: mujoco.FatalError("gladLoadGL error"))]
 )

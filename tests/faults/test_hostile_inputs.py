@@ -73,6 +73,7 @@ def numbers():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_hostile_cases_are_used_or_refused_as_they_should_be():
     outcomes = list(run_cases(case_factory, numbers(), os.cpu_count() or 1))
     assert len(outcomes) == len(numbers())

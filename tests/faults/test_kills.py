@@ -87,7 +87,10 @@ def contents(folder):
     }
 
 
-@pytest.fixture(scope="module", params=list(COMMANDS))
+@pytest.fixture(
+    scope="module",
+    params=["run", *(pytest.param(name, marks=pytest.mark.long) for name in ("batch", "packed"))],
+)
 def undisturbed(request, tmp_path_factory):
     """A command, the folder that it writes (without packing), and its processor time, s."""
     folder = tmp_path_factory.mktemp("undisturbed")

@@ -18,6 +18,7 @@ from hud.schema import from_dict, json_schema, to_dict
 CONFORMS = Draft202012Validator(json.loads(json.dumps(json_schema()))).is_valid
 
 
+@pytest.mark.slow
 @given(
     st.sampled_from([*CONDITIONS, "highlight-minimap", "optimal-minimap-xray", "optimal-regret"]),
     st.integers(0, 24),

@@ -106,6 +106,7 @@ def test_reward_is_to_finish_soon(followed, own_way):
     assert followed.of("end")[0]["t"] < own_way.of("end")[0]["t"]
 
 
+@pytest.mark.slow
 def test_the_assistant_cannot_touch_the_world(house):
     """Under every condition, the same actions lead to the same states."""
     finals = set()

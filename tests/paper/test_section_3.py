@@ -78,6 +78,7 @@ def refused(house, pictures):  # noqa: ARG001 - drawn once
     return user.tried, photographer.pictures, log.events
 
 
+@pytest.mark.slow
 def test_every_refusal_is_caused_in_a_session(refused):
     tried, _, events = refused
     assert set(tried) == set(Refusal)

@@ -69,6 +69,7 @@ def test_bins_stay_fixed_over_difficulties(house):
     assert places[6] == places[24]
 
 
+@pytest.mark.slow
 def test_forty_points_are_navigable_and_a_metre_from_each_other_and_from_every_bin(houses, house):
     bins = np.array([r.center[:2] for r in house.receptacles.values()])
     for points in houses[1].values():

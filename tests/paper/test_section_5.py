@@ -137,6 +137,7 @@ def test_highlight_has_a_flagpole_over_every_misplaced_object_and_no_other(highl
         assert poles == set(observation.names_with(ObjectStatus.LOOSE))
 
 
+@pytest.mark.slow
 @sizes
 @pytest.mark.parametrize("assistance", ["highlight", "optimal"])
 def test_flagpoles_are_seen_through_walls_dimmed(starts, size, assistance):
@@ -219,6 +220,7 @@ def test_under_optimal_the_list_is_the_plan_and_done_steps_are_crossed_out(own_w
         assert [item.current for item in state.checklist].count(True) == (0 if all(done) else 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("assistance", "told"), [("none", False), ("highlight", False), ("guided", True)])
 def test_replanning_is_announced_where_the_plan_is_shown_and_only_there(house, assistance, told):
     played = play(house, assistance, user="boltzmann:30", objects=3)

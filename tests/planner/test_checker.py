@@ -31,6 +31,7 @@ def claim(plan, lower_bound):
     return dataclasses.replace(plan, lower_bound=lower_bound, status=status, certificate=None)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),

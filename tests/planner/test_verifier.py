@@ -101,6 +101,7 @@ def test_the_bound_of_a_search_that_was_cut_short_is_confirmed():
     assert found.lower_bound == pytest.approx(plan.lower_bound, rel=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("capacity", [3, 4])
 def test_other_capacities_are_verified_by_trying_all(capacity):
     problem = random_problem(2, 8, 2, capacity)

@@ -210,6 +210,7 @@ def published(measure, effect, objects=None):
     return next(t for t in PUBLISHED.tests if (t.measure, t.effect, t.objects) == (measure, effect, objects))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("eta_squared", [0.0, 0.05, 0.3])
 def test_prediction_intervals_hold_nine_second_studies_in_ten(eta_squared):
     rng, people = np.random.default_rng(0), 119

@@ -42,6 +42,7 @@ def p_values(values, rng):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_without_effects_every_test_finds_one_in_4_to_6_percent():
     """Holm's correction finds fewer by construction (docs/analysis.md)."""
     hits = {}
@@ -55,6 +56,7 @@ def test_without_effects_every_test_finds_one_in_4_to_6_percent():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_with_unequal_variances_only_tests_that_allow_them_keep_5_percent():
     """One condition varies twice as much; it has the smallest cells. Within three standard errors of 1,000 studies."""
     spread = np.where(assistance == "highlight", 2.0, 1.0)
@@ -70,6 +72,7 @@ def test_with_unequal_variances_only_tests_that_allow_them_keep_5_percent():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("side", [-1, 1])
 def test_an_effect_of_just_the_bound_is_called_equivalent_in_at_most_6_percent(side):
     """By two one-sided tests of a pair; and by the F test of an effect of just that eta squared."""
@@ -87,6 +90,7 @@ def test_an_effect_of_just_the_bound_is_called_equivalent_in_at_most_6_percent(s
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_trends_and_orders_of_the_score_are_found_in_5_percent_of_studies_without_them():
     """A rise is one-sided; of orders, any of the three pairs in either direction."""
     pattern, found = table_of(made_up_people()), []

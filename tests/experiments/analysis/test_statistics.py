@@ -310,6 +310,7 @@ def test_the_mixed_model_of_a_published_example():
     assert deviations == pytest.approx((1.332465, 1.100295), abs=5e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.7])
 def test_the_interval_of_the_share_of_houses_holds_the_true_one(share):
     rng, held = np.random.default_rng(4), 0
@@ -394,6 +395,7 @@ def test_factors_with_as_many_levels_as_trials_or_the_same_ones_are_refused_at_o
         mixed_model(np.random.default_rng(0).normal(size=len(rows)), rows % 2, np.full(len(rows), 6), factors)
 
 
+@pytest.mark.slow
 def test_sparse_crossproducts_give_the_model_of_dense_ones(monkeypatch):
     """Persons crossed with houses, and houses with conditions nested in houses."""
     rng = np.random.default_rng(0)

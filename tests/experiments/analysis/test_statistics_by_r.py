@@ -141,6 +141,7 @@ def assert_equal(ours, theirs, tolerance, where):
         assert ours == pytest.approx(theirs, rel=tolerance, abs=1e-10), where
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OURS)
 def test_a_statistic_is_that_of_r(name):
     assert_equal(OURS[name](), R[name], TOLERANCES.get(name, 1e-8), name)

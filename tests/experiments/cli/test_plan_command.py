@@ -62,6 +62,7 @@ def test_a_limit_too_short_for_any_planner_still_gives_a_tour(tmp_path, capsys):
     assert len(answer["visits"]) == 61
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_planning_with_the_best_tour_so_far(number):
     command = [sys.executable, "-m", "experiments.cli.main", "plan", "-", "--time-limit", "100"]
@@ -82,6 +83,7 @@ def test_a_signal_ends_planning_with_the_best_tour_so_far(number):
     assert "best tour so far" in err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "reason"), [({"capacity": 3}, "capacity of 3"), ({}, "more than 40"), (None, "triangle")]
 )

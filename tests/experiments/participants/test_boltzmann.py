@@ -28,6 +28,7 @@ def choices(asked, unknown=()):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("temperature", "unknown"),
     [(0.001, ()), (0.3, ()), (1.0, ()), (20.0, ()), (1e6, ()), (1.0, (2, 3, 4))],

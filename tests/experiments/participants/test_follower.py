@@ -17,6 +17,7 @@ def played(house, **options):
     return record.recording["state_hash"].tolist(), log.events[2:], world, record.trajectory
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("assistance", "user"), [("none", "searcher"), ("highlight", "nearest"), ("none-minimap", "searcher")]
 )
@@ -28,6 +29,7 @@ def test_it_is_the_default():
     assert TrialConfig(objects=6, assistance="none", seed=0).user == DEFAULT_PARTICIPANT == "follower"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("assistance", ["none", "highlight", "optimal"])
 @pytest.mark.parametrize("fidelity", ["event", "full"])
 def test_one_hand_carries_one_object(house, assistance, fidelity):

@@ -226,6 +226,7 @@ def played(house, config):
     return session.record.record().recording["state_hash"].tolist(), log.events
 
 
+@pytest.mark.slow
 def test_who_complies_never_deviates_however_tempted_and_who_does_not_does(house):
     tempted = {"abandons": 1.0, "picks_up": 1.0, "beside": 9.0, "quits": 0.0}
 
@@ -238,6 +239,7 @@ def test_who_complies_never_deviates_however_tempted_and_who_does_not_does(house
     assert any(deviations(0.0, seed) for seed in range(3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 3])
 def test_who_gives_up_the_only_object_it_knows_looks_for_others(house, seed):
     fickle = {"compliance.follows": 0.5, "compliance.abandons": 1.0, "compliance.picks_up": 0.0}

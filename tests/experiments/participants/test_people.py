@@ -152,6 +152,7 @@ def test_every_value_that_was_drawn_is_logged_and_measured(run):
     }
 
 
+@pytest.mark.slow
 def test_a_replay_is_of_the_person_that_was_logged(run, house, capsys):
     assert replay(run, house=house).person == read_run(run).person
     assert main(["replay", str(run)]) == 0

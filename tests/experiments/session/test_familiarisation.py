@@ -84,6 +84,7 @@ def test_the_camera_moves_smoothly_where_a_person_can_walk(house, path):
     assert set(path.positions[:, 2]) == {PersonParameters().eye_height}
 
 
+@pytest.mark.slow
 def test_what_rays_see_of_the_bins_is_what_the_picture_shows(house, path):
     compiled = compiled_house(house.catalogue)
     model, data = compiled.model, compiled.data
@@ -250,6 +251,7 @@ def test_a_session_takes_the_place_of_one_before_only_with_force(tmp_path):
 # What participants know
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("user", "assistance"), [("searcher", "none"), ("nearest", "highlight")])
 def test_bins_that_were_not_seen_are_searched_for(house, user, assistance, step_singly):
     """They are found, no sooner, and the run is the same in single steps. Whoever saw all knows the house."""

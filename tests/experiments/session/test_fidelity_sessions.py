@@ -60,6 +60,7 @@ def pause(house, rng):  # noqa: ARG001 - the interface of participants
     return Pauser()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("assistance", "user", "fidelity"),
     [

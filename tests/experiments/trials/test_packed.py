@@ -56,6 +56,7 @@ def plan(out, *trials):
     return plan_batch(trials, check_trials(trials), out)
 
 
+@pytest.mark.slow
 def test_a_packed_batch_is_resumed_and_extended_by_either_kind(folders, tmp_path, monkeypatch):
     out, reports, expected = tmp_path / "b", [], rows(folders)
     monkeypatch.setattr(

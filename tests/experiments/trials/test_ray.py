@@ -23,7 +23,7 @@ from mjsim.support.files import ROOT
 
 ONE = {"objects": [2], "assistance": ["optimal"], "fidelity": "event", "regret": False}
 DESIGN = factorial(**ONE, users=["follower"], seeds=range(4))
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("ray")]
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +33,8 @@ def cluster():
         patch.setenv("RAY_worker_niceness", "0")
         patch.setenv("RAY_raylet_start_wait_time_s", "300")  # a busy machine takes its time
         patch.setenv("PYTHONPATH", str(ROOT))
+        for name, value in ray_workers.ENVIRONMENT.items():  # Ray reads them when the cluster starts
+            patch.setenv(name, value)
         found = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
         patch.setenv("RAY_ADDRESS", found.address)
         for _ in range(2):

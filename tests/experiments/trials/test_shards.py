@@ -267,6 +267,7 @@ def simulated(tmp_path_factory):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("shared", [True, False])
 def test_shards_that_were_killed_and_started_again_make_what_one_machine_makes(simulated, tmp_path, shared):
     """As in an array job: all tasks run at the same time, some are killed, and those that are incomplete run again."""

@@ -32,6 +32,7 @@ def test_folders_may_have_any_name(name, tmp_path):
     assert read_rows(parquet) == ROWS and csv.is_file()
 
 
+@pytest.mark.slow
 def test_a_changed_byte_of_the_footer_is_refused_or_changes_nothing(table):
     data = table.read_bytes()
     footer = len(data) - 8 - int.from_bytes(data[-8:-4], "little")

@@ -137,6 +137,7 @@ def test_workers_read_many_trials_and_progress_is_shown(folder, monkeypatch):
     assert steps == [(1, 3), (2, 3), (3, 3)]
 
 
+@pytest.mark.slow
 def test_a_batch_reads_nothing_that_its_workers_have_read(tmp_path, monkeypatch):
     def refuse(path):
         raise AssertionError(f"{path} is read again")

@@ -15,7 +15,7 @@ from experiments.record.phases import TASK
 from experiments.record.records import EVENTS, read_events
 from experiments.trials.replay.replay import replay
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 FAULTS_OF_A_VISIT = 12
 MAX_ROWS = 100
 

@@ -133,6 +133,7 @@ async def disturb(server, messages, requests, rng):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_odd_messages_and_requests_are_refused_and_disturb_nobody(tmp_path):
     count = int(os.environ.get("MJSIM_FAULTS", "4000"))
     with PlayProcess(tmp_path / "visits", "--sessions", "2", *FAST) as server:

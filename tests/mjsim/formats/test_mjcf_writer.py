@@ -40,6 +40,7 @@ def exported(scene, tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_stock_mujoco_opens_it_from_another_folder(exported, scene, tmp_path):
     moved = tmp_path / "moved"
     shutil.copytree(exported.parent, moved)

@@ -27,6 +27,7 @@ def boxes(space: Space) -> Iterator[list[Rectangle]]:
             yield [Rectangle(*moved(part.spot, place.x, place.y, place.yaw)) for part in piece.parts]
 
 
+@pytest.mark.slow
 def test_pieces_stand_in_their_rooms_and_not_in_one_another(home: FurnishedHome) -> None:
     for space in home.spaces:
         stood = list(boxes(space))
@@ -97,6 +98,7 @@ def made() -> Furnishing:
     return furnish(flat(), BINS, PALETTE, 3)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_home_and_another_seed_another(made: Furnishing) -> None:
     assert furnish(flat(), BINS, PALETTE, 3) == made
     assert furnish(flat(), BINS, PALETTE, 4) != made

@@ -44,6 +44,7 @@ def test_rooms_are_disjoint_and_cover_a_rectangle_or_an_l(seed: int, rooms: int)
     assert free == pytest.approx(0.0, abs=1e-6) if not bare else len(bare) == 1
 
 
+@pytest.mark.slow
 @FEW
 @CASES
 def test_rooms_are_as_large_as_they_should_be_and_have_daylight(seed: int, rooms: int) -> None:
@@ -56,6 +57,7 @@ def test_rooms_are_as_large_as_they_should_be_and_have_daylight(seed: int, rooms
         assert not needs.daylight or plan.windows_of(room.key)
 
 
+@pytest.mark.slow
 @FEW
 @CASES
 def test_doors_connect_all_rooms_and_are_wide_enough(seed: int, rooms: int) -> None:

@@ -64,6 +64,7 @@ def test_forty_pieces_of_furniture_of_several_parts(model):
     assert {name.split("/")[0] for name in furniture} == ROOMS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("only", "radius", "area"), [("", 0.25, 3.0), ("", 0.34, 0.0), ("/structure", 0.42, 0.0)]
 )

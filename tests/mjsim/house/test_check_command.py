@@ -67,6 +67,7 @@ def test_all_findings_are_listed_and_drawn(fresh_house, tmp_path, capsys):
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_a_picture_cuts_no_finding_off(tmp_path):
     findings = tuple(
         Finding("groups", "house", f"{n} {'W' * 70} {'x' * 400}", "use group 0") for n in range(12)

@@ -198,6 +198,7 @@ MUTATIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", MUTATIONS)
 def test_a_mutation_fails(studio, tmp_path, what):
     """On the known driver by its hash, on any other by the bound on PSNR."""

@@ -48,6 +48,7 @@ def behind(wall, colour):
     return frame
 
 
+@pytest.mark.slow
 def test_a_pole_behind_any_wall_of_200_homes_has_an_outline_of_3_to_1(walls):
     assert len(walls) >= HOMES * len(SHADES)
     for wall in walls:

@@ -233,6 +233,7 @@ print(report.usable, report.gl, "did not start" in "\\n".join(report.lines()))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "limit", ["0.3", *(pytest.param(text, marks=pytest.mark.slow) for text in ("nan", "soon", "-1"))]
 )

@@ -122,6 +122,7 @@ def test_planned_paths_keep_clear_of_walls_by_the_persons_size(house):
     assert house.for_person(PersonParameters(walking_speed=0.5)) is house
 
 
+@pytest.mark.slow
 @given(st.floats(0.5, 2.4), st.sampled_from([(640, 480), (960, 720), (1920, 1080), (480, 640)]))
 def test_pictures_of_any_shape_are_as_wide_as_the_percept(field, size):
     """Half the picture is as wide, at distance 1, as the frustum in which a participant sees."""

@@ -105,6 +105,7 @@ def test_the_oracle_knows_a_tour_that_was_worked_out_by_hand():
     assert expected(RoutingProblem(d, 0, pair, (3,), 1, resolution=1e-4)) == 100_000  # tour: 0 5 2 1 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("capacity", [1, 2])
 @pytest.mark.parametrize("n", [13, 15, 16, 18])
 def test_search_and_full_table_agree_up_to_eighteen_objects(n, capacity):

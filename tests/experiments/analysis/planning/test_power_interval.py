@@ -19,6 +19,7 @@ def skewed(rng, people):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("people", "slope", "draw"), [(30, 0.8, normal), (200, 0.4, skewed)])
 def test_the_interval_of_people_needed_holds_their_number_in_nine_studies_of_ten(people, slope, draw):
     """Of people whose mean rises by `slope` standard deviations from 6 objects to 24."""

@@ -210,6 +210,7 @@ MANY = int(os.environ.get("MJSIM_FAULTS", "4"))  # for each database
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("kind", "seed"), [("sqlite", 1), ("mariadb", 2), ("postgresql", 3)])
 def test_what_was_acknowledged_is_kept_once(tmp_path, monkeypatch, kind, seed):
     monkeypatch.setenv(Prolific.variable, SECRET)

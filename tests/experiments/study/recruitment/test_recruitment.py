@@ -218,6 +218,7 @@ def test_a_task_that_was_over_when_its_page_was_closed_is_noted(tmp_path, monkey
         assert "Your opinion" in client.get(link).text
 
 
+@pytest.mark.slow
 def test_a_task_whose_end_the_database_refused_is_recorded_before_its_participant_times_out(
     tmp_path, monkeypatch
 ):

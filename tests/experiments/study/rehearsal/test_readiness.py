@@ -190,6 +190,7 @@ def _walked(study, folder, monkeypatch, phases=None):
     return walked, pictures
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_a_dry_run_goes_every_way_that_there_is(study, tmp_path, monkeypatch):
     walked, pictures = _walked(study, tmp_path, monkeypatch)
@@ -223,6 +224,7 @@ async def _play_nothing(self, trial, leaves):  # noqa: ARG001 - everybody stays
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings",
     [

@@ -148,6 +148,7 @@ def test_every_kind_of_action_replays(house, tmp_path, own_module):
 # What is not as recorded is named with the first bad step.
 
 
+@pytest.mark.slow
 @settings(FEW, max_examples=12)
 @given(step=st.integers(0, 400), column=st.sampled_from(COLUMNS), data=st.data())
 def test_a_changed_value_is_named_with_its_step(run, copy, house, step, column, data):
@@ -369,6 +370,7 @@ def frames_of(folder, house, tmp_path, **options):
     return replay(folder, house=house, film=target, **options)
 
 
+@pytest.mark.slow
 def test_a_replay_films_the_same_frames(film, house, tmp_path):
     report = frames_of(film, house, tmp_path)
     assert report.frames_sha256 == read_json(film / records.METRICS)["frames_sha256"]
@@ -403,6 +405,7 @@ def test_a_replay_shows_the_list_scrolled_as_it_was(house, tmp_path):
             assert all(np.array_equal(a, b) for a, b in zip(filmed[first:], frames, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{"assistance": "none"}, {"camera": "top-down"}, {"camera": "free"}])
 def test_another_view_of_the_same_run(film, house, tmp_path, options):
     report = frames_of(film, house, tmp_path, start=2.0, **options)
@@ -432,6 +435,7 @@ def test_a_film_has_the_shape_of_the_page(run, draw, view, frame):
         assert (width, height, config.field_of_view) == (*frame, 1.9)
 
 
+@pytest.mark.slow
 def test_a_replay_that_fails_leaves_no_film(film, house, tmp_path):
     folder = shutil.copytree(film, tmp_path / "copy")
     hashes = read_arrays(folder / records.RECORDING)["state_hash"]

@@ -11,6 +11,7 @@ from experiments.visit.store import Store
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_everybody_who_comes_at_once_gets_every_page_and_a_place_of_their_own(tmp_path, url):
     people = 500
     with study_process(tmp_path, "--database", url, people=people // 2) as server:

@@ -45,6 +45,7 @@ async def test_each_place_has_its_house_and_each_person_an_order(arrive, assign)
     assert len({one.order_seed for one in given} | {one.person_seed for one in given}) == 10
 
 
+@pytest.mark.slow
 async def test_500_at_once_from_two_connections_get_a_place_of_their_own(store, url, arrive, assign):
     cells = [CellQuota(33, range(33))] * 12  # 396 places
     people = await asyncio.gather(*(arrive(number) for number in range(500)))

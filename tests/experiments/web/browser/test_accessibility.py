@@ -1,5 +1,7 @@
 """No page of a visit breaks a rule that axe-core checks, and the keyboard alone leads through all of them."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,8 @@ def visit(browser, server, look):
     page.get_by_role("heading", name="Keys").wait_for()
     check()
     page.keyboard.press("Escape")
+    page.locator("#help").wait_for(state="hidden")
+    page.locator("#play[data-phase=running]").wait_for()
     page.keyboard.press("p")
     page.get_by_role("heading", name="Paused").wait_for()
     check()
@@ -66,6 +70,12 @@ def visit(browser, server, look):
     check()
     page.context.close()
     return found
+
+
+def press(page, label):
+    """Press Enter on the button that has the focus, once it is the button with this label."""
+    page.locator("button:focus", has_text=re.compile(f"^{label}$")).wait_for()
+    page.keyboard.press("Enter")
 
 
 def begin(page, check=lambda: None):
@@ -94,16 +104,16 @@ def elsewhere(browser, server, page, look):
     second.goto(page.url)
     second.get_by_role("heading", name="This session is open on another page").wait_for()
     found += violations(second)
-    second.keyboard.press("Enter")
+    press(second, "Continue here")
     page.get_by_role("heading", name="This session continues on another page").wait_for()
     found += violations(page)
     second.get_by_role("heading", name="Paused").wait_for()
-    page.keyboard.press("Enter")  # this one is loaded again, and asks in its turn
+    press(page, "Continue here")  # this one is loaded again, and asks in its turn
     page.get_by_role("heading", name="This session is open on another page").wait_for()
     second.close()
-    page.keyboard.press("Enter")
+    press(page, "Continue here")
     page.get_by_role("heading", name="Paused").wait_for()
-    page.keyboard.press("Enter")
+    press(page, "Continue")
     page.locator("#panel").wait_for(state="hidden")
     return found
 
@@ -111,7 +121,7 @@ def elsewhere(browser, server, page, look):
 DARK_PHONE = {**PHONE, "color_scheme": "dark", "reduced_motion": "reduce"}
 
 
-@pytest.mark.parametrize("look", [DESK, DARK_PHONE])
+@pytest.mark.parametrize("look", [DESK, pytest.param(DARK_PHONE, marks=pytest.mark.long)])
 def test_every_page_passes_axe_and_is_left_by_keys(tmp_path, chromium, look):
     film = tmp_path / "flythrough.mp4"
     with VideoWriter(film, width=64, height=48) as writer:

@@ -117,6 +117,7 @@ def test_a_mute_connection_is_replaced_and_a_held_key_still_walks(tmp_path, requ
         page.up("ArrowLeft")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("browser", "draw"), [("chromium", "auto"), ("firefox", "server")])
 def test_a_browser_that_stops_for_30_s_continues_by_itself(tmp_path, request, browser, draw):
     page = request.getfixturevalue(f"{browser}_page")
@@ -158,7 +159,7 @@ def test_a_page_that_was_taken_over_says_so_and_takes_back(tmp_path, chromium):
         remains(first, PLAYING, 2.0)
 
 
-@pytest.mark.parametrize("draw", ["auto", "browser"])
+@pytest.mark.parametrize("draw", ["auto", pytest.param("browser", marks=pytest.mark.long)])
 def test_a_lost_picture_stops_the_clock_until_it_is_back(tmp_path, chromium_page, draw):
     page = chromium_page
     with task(tmp_path, draw) as (server, _):

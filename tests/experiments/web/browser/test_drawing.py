@@ -8,7 +8,7 @@ import pytest
 from hud.markers import flagpole
 from tools.drawn_pairs import View, draw_pairs, sampled_scene, ssim, views
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("drawing")]
 
 LEAST, MEAN = 0.95, 0.97  # SSIM of a pair, and of all
 # A person in the hall looks at a wall, and a pole is behind it in the bedroom.

@@ -20,7 +20,10 @@ LEAST = 0.95  # SSIM, as of the pairs of pictures
 STILL = 6.0  # s after which messages have faded, and the page has told its size
 
 
-@pytest.mark.parametrize(("width", "height", "degrees"), [(800, 600, None), (1280, 720, 105)])
+@pytest.mark.parametrize(
+    ("width", "height", "degrees"),
+    [(800, 600, None), pytest.param(1280, 720, 105, marks=pytest.mark.long)],
+)
 def test_the_film_shows_what_the_window_showed(tmp_path, chromium_page, width, height, degrees):
     page = chromium_page
     page.resize(width, height)

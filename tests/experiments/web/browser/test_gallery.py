@@ -6,7 +6,7 @@ from experiments.cli.main import main
 from tests.experiments.web.browser.test_accessibility import DESK, PHONE, violations
 from tests.experiments.web.browser.test_view import HARMLESS, LOADED, VARIED
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("gallery")]
 
 
 @pytest.fixture(scope="module")

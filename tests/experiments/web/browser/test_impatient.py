@@ -11,7 +11,7 @@ from benchmarks.support.play_server import PlayProcess
 from tests.experiments.web.browser.key_presser import WATCH
 from tests.experiments.web.browser.study_visit import STUDY, StudyVisit
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 
 
 # Firefox draws so slowly without a graphics card that it takes minutes.

@@ -17,7 +17,7 @@ from hud.conditions import CONDITIONS
 from tests.experiments.web.browser.key_presser import WATCH, KeyPresser, choose
 from tests.experiments.web.browser.pages import pass_story
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 
 HARMLESS = (  # said where there is no graphics card, or because a test asks
     "KHR_parallel_shader_compile",

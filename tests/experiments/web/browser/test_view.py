@@ -7,7 +7,7 @@ from experiments.trials.trial_config import TrialConfig
 from experiments.web.client_files import STATIC
 from experiments.web.viewing.page import view_page
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("view")]
 
 HARMLESS = ("KHR_parallel_shader_compile", "GL Driver Message")  # said where there is no graphics card
 LOADED = "document.getElementById('debug').textContent === ''"

@@ -56,6 +56,7 @@ def test_homes_are_drawn_once_and_listed(tmp_path, capsys):
     assert "my_house" not in (out / "index.html").read_text("utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("in_this_process")
 def test_a_home_that_cannot_be_used_leaves_the_others(tmp_path, capsys):
     bad = write_example_house(tmp_path / "bad")

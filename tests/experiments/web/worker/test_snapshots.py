@@ -73,6 +73,7 @@ def walk(live, size, angle, steps, rng):
     return told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "size", "angle"), [(3, WIDE, None), (4, WIDE, 2.2), (5, TALL, None)])
 def test_nothing_pops_up(house, tmp_path, seed, size, angle):
     limits = None if angle is None else f"1.0,{angle}"

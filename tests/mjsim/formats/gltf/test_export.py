@@ -227,6 +227,7 @@ def test_an_episode_has_its_objects_where_they_lie(placed):
         np.testing.assert_allclose(matrix[:3, :3].ravel(), turned, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_house_of_ones_own_with_imported_objects(tmp_path, validated):
     path = write_example_house(tmp_path / "example")
     for key in ("textured_box", "repeating_texture", "vertex_colours", "truck"):
@@ -302,6 +303,7 @@ def test_the_validator_of_gltf_finds_neither_errors_nor_warnings(files, placed, 
 # --- on disk
 
 
+@pytest.mark.slow
 def test_a_scene_is_made_once_compressed_and_always_the_same(catalogue, files, tmp_path, monkeypatch):
     folder = cache.cached_scene(catalogue, tmp_path)
     monkeypatch.setattr(cache, "export_scene", None)  # what is there is not made again

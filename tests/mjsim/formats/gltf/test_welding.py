@@ -55,6 +55,7 @@ def house(request):
     return model, before, welded(model, before)
 
 
+@pytest.mark.slow
 def test_no_corner_of_a_box_is_inside_an_edge(house):
     model, before, after = house
     is_box = model.geom_type == mujoco.mjtGeom.mjGEOM_BOX

@@ -52,6 +52,7 @@ def check_convex(polygon):
     assert math.isclose(shapely.Polygon(polygon).area, shapely.Polygon(polygon).convex_hull.area)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(
     kind=st.sampled_from(["sphere", "capsule", "ellipsoid", "cylinder", "box"]),

@@ -122,6 +122,7 @@ def test_culling_changes_no_answer(episode, catalogue, navmesh):
     assert count > 60
 
 
+@pytest.mark.slow
 def test_what_is_seen_is_what_a_picture_shows(scene, navmesh):
     """From anywhere in the apartment: nothing that no pixel shows, and all that is near and not a speck."""
     data = mujoco.MjData(scene.model)

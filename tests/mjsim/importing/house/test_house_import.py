@@ -136,6 +136,7 @@ def colliding(house, name):
     return points.min(axis=0), points.max(axis=0)
 
 
+@pytest.mark.slow
 def test_gltf_and_obj_give_the_same_floor_and_an_obj_tells_its_unit_and_axes(tmp_path):
     said = {}
     for name, write in (("glb", write_glb), ("obj", write_obj)):
@@ -261,6 +262,7 @@ def test_a_damaged_world_is_refused_by_its_cause_and_nothing_is_written(tmp_path
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_left_out_if_the_user_says_so(tmp_path):
     source, table = write_sdf(tmp_path, extra=INCLUDE), tmp_path / "models" / "table" / "meshes" / "table.obj"
     with pytest.raises(AssetError, match="--skip-missing"):

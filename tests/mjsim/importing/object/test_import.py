@@ -37,6 +37,7 @@ from mjsim.values.options import WorldOptions
 
 MAKE = trimesh.creation
 WRITE_PREVIEW = "mjsim.importing.object.mesh_import.write_preview"
+pytestmark = pytest.mark.xdist_group("imported objects")
 
 
 @pytest.fixture(scope="module")
@@ -242,6 +243,7 @@ def test_the_pose_is_steady_or_the_file_s_own(seed):
         assert np.all(middle > low) and np.all(middle < high)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HOLLOW)
 def test_grips_are_on_something_at_the_top(tmp_path, name):
     item = take(tmp_path, HOLLOW[name]())
@@ -293,6 +295,7 @@ def test_parts_cover_the_body(tmp_path):
     assert all(hull.find_simplex([0, 0, 0.04]) < 0 for hull in hulls)  # between the legs
 
 
+@pytest.mark.slow
 def test_a_ball_in_a_wire_ring_stays_and_collides(tmp_path):
     ring = MAKE.torus(0.11, 0.004, major_sections=24, minor_sections=8)
     pieces = [ring, MAKE.icosphere(1, 0.04)]

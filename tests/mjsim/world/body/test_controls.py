@@ -83,6 +83,7 @@ def test_the_body_turns_to_where_the_mouse_points_within_its_limits(scene, yaw):
     assert all(abs(a.turn) <= PERSON.turning_speed for a in actions)
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(st.lists(INPUTS, min_size=1, max_size=6))
 def test_no_input_exceeds_the_limits(scene, batches):

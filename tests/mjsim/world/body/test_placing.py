@@ -106,6 +106,7 @@ def test_an_object_that_cannot_stay_is_loose_again(small_catalogue):
 MODELS_PER_RUN = 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", ["dishes", "toys", "books", "laundry", "office", "recycling"])
 def test_every_model_of_the_apartment_goes_into_its_receptacle(catalogue, category):
     models = list(catalogue.categories[category].objects)
