@@ -1,6 +1,7 @@
 """Read and atomically write files with arrays, JSON and checksums."""
 
 import hashlib
+import io
 import json
 import re
 import zipfile
@@ -35,8 +36,7 @@ def read_arrays(
         RecordError: The file is missing, damaged or incomplete.
     """
     try:
-        check_input(path)
-        with np.load(path, allow_pickle=False) as archive:
+        with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in only or archive.files}
     except FileNotFoundError as error:
         raise RecordError(f"cannot read {path}: {error.strerror}") from error

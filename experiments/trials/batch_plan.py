@@ -81,7 +81,6 @@ def plan_batch(
     for trial, needed in wanted.items():
         same = [s for s in by_key.get(trial_key(trial.settings()), []) if s.is_in(trial.house, needed)]
         current = [s for s in same if s.complete and s.inputs == needed]
-        path = out / TRIALS / trial_name(trial, needed)
         for old in same:
             if old not in current:
                 reasons.update([_why_again(old, needed)])
@@ -89,6 +88,7 @@ def plan_batch(
         if current:
             done.append(current[0])
             continue
+        path = out / TRIALS / trial_name(trial, needed)
         if path in unusable:
             reasons.update([unusable[path]])
             outdated.add(path.name)
@@ -126,13 +126,14 @@ def check_settings(trials: Sequence[TrialConfig], house: Houses) -> None:
     """Raise an error if a trial has an unknown name, house or episode, or too many points for its house."""
     check_names(trials)
     catalogue = functools.cache(load_catalogue)
-    for name in {trial.house for trial in trials}:
+    houses = {trial.house for trial in trials}
+    for name in houses:
         catalogue(name)
     for trial in {(t.episode, t.house, t.objects): t for t in trials if t.episode is not None}.values():
         _check_episode(trial, catalogue(trial.house))
-    for name, seed, points in dict.fromkeys(
-        (t.house, t.house_seed, t.points) for t in trials if _may_be_small(t)
-    ):
+    custom = {name for name in houses if parse_house(name).kind != "shipped"}  # these may be small
+    sampled = (t for t in trials if t.episode is None and (t.house in custom or t.points > POINTS))
+    for name, seed, points in dict.fromkeys((t.house, t.house_seed, t.points) for t in sampled):
         house(name).sample_points(seed=seed, points=points)
 
 
@@ -146,11 +147,6 @@ def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
         if _may_not_fit(trial):
             _begin(trial, house(trial.house))
     return [trial_inputs(trial, catalogue(trial.house)) for trial in trials]
-
-
-def _may_be_small(trial: TrialConfig) -> bool:
-    custom = parse_house(trial.house).kind != "shipped"
-    return trial.episode is None and (custom or trial.points > POINTS)
 
 
 def _check_episode(trial: TrialConfig, catalogue: Catalogue) -> None:

@@ -50,7 +50,10 @@ def draw_person(config: TrialConfig) -> PersonParameters:
         check_person(of_participant)
     except ConfigError as error:
         raise ConfigError(f"participant {config.user!r}: {error}") from error
-    return drawn_person(of_participant.updated(config.person), _session_rng(config.person_seed, _PERSON))
+    described = of_participant.updated(config.person)
+    if not described:
+        return PersonParameters()
+    return drawn_person(described, _session_rng(config.person_seed, _PERSON))
 
 
 def draw_behaviour(config: TrialConfig) -> dict[str, float]:

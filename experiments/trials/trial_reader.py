@@ -8,7 +8,7 @@ changed. The cache may be deleted at any time.
 import dataclasses
 import gzip
 import zlib
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from pathlib import Path
@@ -83,7 +83,8 @@ class TrialReader:
         unusable = {}
         try:
             unread = [path for path in paths if path.name not in self._known]
-            for number, (path, result) in enumerate(self._results(unread), start=1):
+            results = read_runs(unread, self._workers)
+            for number, (path, result) in enumerate(zip(unread, results, strict=True), start=1):
                 if isinstance(result, str):
                     unusable[self._trials / path.name] = result
                 else:
@@ -103,15 +104,6 @@ class TrialReader:
             return None
         return dataclasses.replace(trial, stamp=stamp) if trial.stamp == UNSTAMPED else trial
 
-    def _results(self, unread: list[Path]) -> Iterator[tuple[Path, StoredTrial | str]]:
-        left = iter(unread)
-        if self._workers > 1 and len(unread) >= POOL_FROM:
-            with suppress(BrokenProcessPool), worker_pool(self._workers) as pool:
-                for result in pool.map(_read, unread, chunksize=20):
-                    yield next(left), result
-        for path in left:  # all trials, or those that the worker processes did not read
-            yield path, _read(path)
-
     def _trial(self, row: _CachedRow) -> StoredTrial:
         return StoredTrial(
             self._trials / row.name, row.settings, row.inputs, row.row, row.as_measured, row.stamp
@@ -127,6 +119,18 @@ class TrialReader:
                 row = _CachedRow(name, t.stamp, dict(t.settings), dict(t.inputs), dict(t.row), t.as_measured)
                 file.write(_ENCODER.encode(row) + b"\n")
         self._saved = kept
+
+
+def read_runs(paths: Sequence[Path], workers: int) -> Iterator[StoredTrial | str]:
+    """Yield the trial in each run directory, or a message that explains why it cannot be read."""
+    left = iter(paths)
+    if workers > 1 and len(paths) >= POOL_FROM:
+        with suppress(BrokenProcessPool), worker_pool(workers) as pool:
+            for result in pool.map(_read, paths, chunksize=20):
+                next(left)
+                yield result
+    for path in left:  # all trials, or those that the worker processes did not read
+        yield _read(path)
 
 
 def read_trials(out: Path) -> tuple[list[StoredTrial], Mapping[Path, str]]:

@@ -95,6 +95,7 @@ def test_latencies_where_no_frame_comes_are_infinite_and_fail(monkeypatch):
     assert len(said) == 3
 
 
+@pytest.mark.slow
 def test_a_generated_home_is_measured_without_a_fault():
     row = home_figures.figures((1, 50_000))
     assert not [key for key in houses.FAULTS if row.get(key)]

@@ -42,10 +42,12 @@ def served(tmp_path, certificate):
             stdout=log,
             stderr=log,
         )
-        with nginx_before(tmp_path, [behind], front, certificate):
-            yield url, tmp_path
-        study.terminate()
-        study.wait()
+        try:
+            with nginx_before(tmp_path, [behind], front, certificate):
+                yield url, tmp_path
+        finally:
+            study.terminate()
+            study.wait()
 
 
 @pytest.mark.slow

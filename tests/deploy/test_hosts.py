@@ -82,16 +82,18 @@ def hosts(tmp_path, certificate):
     ]
     serve = ("study", "serve", str(tmp_path / "study.toml"))
     found = {}
-    for name, port in zip(("one", "two"), ports, strict=True):
-        (tmp_path / name).mkdir()
-        own = ("--port", str(port), "--host-name", name)
-        found[name] = PlayProcess(tmp_path / name / "out", *words, *own, command=serve)
-        found[name].start()
-    with nginx_before(tmp_path, ports, front, certificate):
-        yield url, found
-    for host in found.values():
-        host.process.terminate()
-        host.process.communicate()
+    try:
+        for name, port in zip(("one", "two"), ports, strict=True):
+            (tmp_path / name).mkdir()
+            own = ("--port", str(port), "--host-name", name)
+            found[name] = PlayProcess(tmp_path / name / "out", *words, *own, command=serve)
+            found[name].start()
+        with nginx_before(tmp_path, ports, front, certificate):
+            yield url, found
+    finally:
+        for host in found.values():
+            host.process.terminate()
+            host.process.communicate()
 
 
 @pytest.mark.slow

@@ -26,6 +26,7 @@ def test_a_run_whose_participant_crashes_names_it(statement, number, tmp_path, m
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_planner_that_crashes_says_where(tmp_path, mjsim, own_module):
     own_module(planner("signal.raise_signal(11)"))
     (tmp_path / "problem.json").write_text(json.dumps(PROBLEM))

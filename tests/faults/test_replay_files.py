@@ -132,6 +132,7 @@ def derived_faults(folder):
     return "; ".join(mismatch.message for mismatch in found)
 
 
+@pytest.mark.slow
 def test_every_field_of_the_metrics_is_checked(copy, house):
     """What cannot be computed anew is protected by the checksum."""
     path = copy / records.METRICS

@@ -53,6 +53,7 @@ def test_the_frame_given_is_left_alone_be_it_read_only_or_strided():
     assert np.array_equal(compose(strided, optimal(), sample.pictures(), sample.TEXTS), drawn)
 
 
+@pytest.mark.slow
 def test_what_a_compositor_drew_before_does_not_matter():
     pictures = sample.pictures()
     kept = Compositor(pictures, sample.TEXTS)

@@ -26,6 +26,7 @@ def played(request):
     return request.getfixturevalue(request.param)
 
 
+@pytest.mark.slow
 def test_a_plan_visits_every_pickup_and_every_dropoff_once(played):
     names = [placed.name for placed in played.world.scene.episode.objects]
     every = sorted(itertools.product(("pick", "place"), names))

@@ -88,6 +88,7 @@ def test_every_refusal_is_caused_in_a_session(refused):
     assert events[-1]["reason"] == "all delivered"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("refusal", list(Refusal), ids=lambda refusal: refusal.value)
 def test_the_message_bar_says_why_an_attempt_is_infeasible(refused, refusal, house, pictures):
     """Its pixels are those of this refusal's text over the same frame; without it, and for others, they differ."""

@@ -81,6 +81,7 @@ def test_forty_points_are_navigable_and_a_metre_from_each_other_and_from_every_b
         assert all(house.navmesh.island_of(point) == 0 for point in points)
 
 
+@pytest.mark.slow
 def test_each_difficulty_uses_the_first_points_and_contains_the_one_below(houses):
     episodes, pools = houses
     for seed in HOUSES:

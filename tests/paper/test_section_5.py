@@ -109,6 +109,7 @@ def test_none_and_highlight_list_in_the_participants_random_order(house):
     assert len(set(orders.values())) == 3
 
 
+@pytest.mark.slow
 def test_picked_objects_are_crossed_out_and_move_to_the_bottom(highlighted):
     for observation, state in highlighted.shown:
         done = [item.done for item in state.checklist]

@@ -57,6 +57,7 @@ def test_no_true_proof_is_refused_and_no_derived_bound_is_above_the_optimum(
             assert derived + allowance(problem, plan) >= plan.certificate.root * plan.certificate.unit > 0.0
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(6, 7), capacity=CAPACITIES, resolution=RESOLUTIONS)
 def test_a_bound_above_the_optimum_is_refused_up_to_seven_objects(seed, n, capacity, resolution):

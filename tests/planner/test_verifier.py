@@ -37,6 +37,7 @@ def test_what_table_and_search_prove_is_confirmed(seed, n, onboard, bins, coinci
         assert plan.cost * (1 - 1e-8) <= found.lower_bound <= plan.cost
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),

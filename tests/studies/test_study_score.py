@@ -189,6 +189,7 @@ def test_a_pool_is_judged_as_a_population(pool):
     assert all(0.0 <= r.rate <= 1.0 for r in rows.values())
 
 
+@pytest.mark.slow
 def test_the_score_command_writes_its_files_and_names_who_is_left_out(tmp_path, capsys):
     people = made_up_people()
     people[4]["ended"] = "time limit"

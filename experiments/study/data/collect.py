@@ -3,7 +3,9 @@
 import csv
 import hashlib
 import io
+import os
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -15,14 +17,14 @@ import msgspec
 
 from experiments.analysis.study.measures import LIKERT_PREFIX, Survey
 from experiments.analysis.study.measures import SURVEY as SURVEY_FILE
-from experiments.errors import ConfigError, RecordError, ReplayError
+from experiments.errors import ConfigError, RecordError
 from experiments.record.files import write_json
 from experiments.record.phases import REHEARSAL, TASK
 from experiments.record.run_directory import is_run, visit_folders
 from experiments.study.data.copies import INDEX
 from experiments.study.file import Study
-from experiments.trials.batch_folder import read_trial
 from experiments.trials.table import write_tables
+from experiments.trials.trial_reader import read_runs
 from experiments.visit.plan import SURVEY
 from experiments.visit.store import Answer, PersonRow, PhaseRow, Store, TrialRow
 from experiments.visit.texts.items import Item
@@ -68,22 +70,23 @@ async def collect(study: Study, store: Store, folder: Path) -> Collected:
     answers_of, phases_of = _by_person(answers), _by_person(await store.phases())
     rows: list[Mapping[str, Any]] = []
     unusable: dict[str, str] = {}
-    unfinished: dict[str, int] = {}
     items = study.texts[SURVEY].items
-    for person in people:
-        trial = trials.get(person.id)
-        if trial is None:
-            unfinished[person.status] = unfinished.get(person.status, 0) + 1
-            continue
-        try:
-            run = read_trial(folder / trial.folder)
-        except (RecordError, ReplayError, OSError) as error:
-            unusable[person_name(person)] = str(error)
+    finished = [person for person in people if person.id in trials]
+    unfinished = Counter(person.status for person in people if person.id not in trials)
+    paths = [folder / trials[person.id].folder for person in finished]
+    for person, run in zip(finished, read_runs(paths, _processes()), strict=True):
+        trial = trials[person.id]
+        if isinstance(run, str):
+            unusable[person_name(person)] = run
             continue
         about = _about(person, trial, phases_of.get(person.id, ()))
         row = {**about, **run.row, **_answers(items, answers_of.get(person.id, ()))}
         rows.append({key: harmless(value) if isinstance(value, str) else value for key, value in row.items()})
     return Collected(_complete(rows), _texts(items, people, answers), unfinished, unusable, survey_of(study))
+
+
+def _processes() -> int:
+    return os.cpu_count() or 1
 
 
 def survey_of(study: Study) -> Survey:
@@ -114,16 +117,15 @@ def collect_visits(folder: Path) -> Collected:
     """Collect the finished tasks in an output folder of `mjsim play`. Personal links are not included."""
     rows: list[Mapping[str, Any]] = []
     unusable: dict[str, str] = {}
-    under_way = 0
-    for visit in visit_folders(folder):
-        name = visit_name(visit.name)
-        if not is_run(visit / TASK):
-            under_way += 1
-            continue
-        try:
-            rows.append({"participant": name, **read_trial(visit / TASK).row})
-        except (RecordError, ReplayError, OSError) as error:
-            unusable[name] = str(error)
+    visits = list(visit_folders(folder))
+    tasks = [visit / TASK for visit in visits if is_run(visit / TASK)]
+    under_way = len(visits) - len(tasks)
+    for path, run in zip(tasks, read_runs(tasks, _processes()), strict=True):
+        name = visit_name(path.parent.name)
+        if isinstance(run, str):
+            unusable[name] = run
+        else:
+            rows.append({"participant": name, **run.row})
     return Collected(_complete(rows), [], {"under way": under_way} if under_way else {}, unusable)
 
 

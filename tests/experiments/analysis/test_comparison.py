@@ -117,6 +117,7 @@ def test_two_pairs_that_hardly_vary_have_no_interval_of_the_effect(tmp_path):
     assert found.effect_interval is None or np.isfinite(found.effect_interval).all()
 
 
+@pytest.mark.slow
 def test_the_command_shows_and_writes_both_and_replaces_nothing(tmp_path, capsys):
     folder = batch(
         tmp_path / "b", {"none": [1.0, 2.0, 3.5], "optimal": [2.0, 2.5, 5.0], "highlight": [1, 1, 1.0]}

@@ -110,6 +110,7 @@ def write_until_killed(folder, run, report):
         number += 1
 
 
+@pytest.mark.slow
 def test_a_killed_writer_loses_nothing_that_was_committed(tmp_path):
     folder, choice, intact = tmp_path / TRIALS, random.Random(0), tmp_path / "intact"
     folder.mkdir()

@@ -105,6 +105,7 @@ def test_what_rays_see_of_the_bins_is_what_the_picture_shows(house, path):
     assert seen == set(house.receptacles)
 
 
+@pytest.mark.slow
 @settings(max_examples=10)
 @given(near=st.floats(0.5, 8.0), narrow=st.floats(0.2, 2.0))
 def test_who_sees_farther_and_wider_sees_no_less(house, path, near, narrow):
@@ -117,6 +118,7 @@ def test_who_sees_farther_and_wider_sees_no_less(house, path, near, narrow):
 # The film
 
 
+@pytest.mark.slow
 def test_the_film_repeats_and_has_the_length_that_was_asked_for(house, tmp_path):
     hashes = {write_flythrough(house, tmp_path / f"{i}.mp4", SMALL, seconds=1.6) for i in range(2)}
     assert len(hashes) == 1

@@ -50,6 +50,7 @@ def checked(house):
     return checker
 
 
+@pytest.mark.slow
 def test_hands_and_what_they_reach_for_are_never_hidden(checked):
     assert len(checked.hidden) >= 10 and max(checked.hidden) == 0
 

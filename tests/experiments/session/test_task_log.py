@@ -16,6 +16,7 @@ from planner.plan import Visit, VisitKind
 from planner.service import Planner
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("assistance", "user"), [("none", "follower"), ("highlight", "boltzmann:1")])
 def test_a_run_is_the_same_whether_plans_are_made_in_a_thread_or_inline(house, assistance, user):
     config = TrialConfig(objects=5, assistance=assistance, seed=2, user=user, fidelity="event")

@@ -12,6 +12,7 @@ from experiments.trials.design import factorial
 ONE = {"objects": [2], "assistance": ["optimal"], "seeds": [0], "fidelity": "event", "regret": False}
 
 
+@pytest.mark.slow
 def test_one_failing_trial_does_not_stop_the_others(tmp_path, own_module, monkeypatch):
     own_module(participant("raise ValueError('nothing to go for')"))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))

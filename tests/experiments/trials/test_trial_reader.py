@@ -124,6 +124,7 @@ def test_a_folder_that_cannot_be_written_is_read(folder, monkeypatch):
     assert len(TrialReader(folder).read()[0]) == 3
 
 
+@pytest.mark.slow
 def test_workers_read_many_trials_and_progress_is_shown(folder, monkeypatch):
     alone, steps = [trial.row for trial in TrialReader(folder).read()[0]], []
     (folder / ROWS).unlink()

@@ -61,6 +61,7 @@ def test_software_rasterisers_are_recognised():
     assert not is_software(GPU.renderer)
 
 
+@pytest.mark.slow
 def test_a_machine_without_opengl_still_gets_a_report():
     """Rendering switched off stands in for a missing library: importing must work, the report must say why."""
     code = (

@@ -161,6 +161,7 @@ def test_x_ray_flagpoles_show_faintly_through_walls(studio, golden_frame):
     golden_frame(seen, "flagpole_x_ray")
 
 
+@pytest.mark.slow
 def test_highlight_shows_every_flagpole_that_a_participant_is_told_of(studio):
     """From a corner of the bedroom across the house: poles behind walls are dimmed, and none is missing."""
     state = condition("highlight")(dataclasses.replace(studio.view, position=(0.8, 0.8)))

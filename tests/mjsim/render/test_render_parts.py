@@ -81,6 +81,7 @@ def assert_same(one, other, images=("rgb", "depth", "segmentation")):
         np.testing.assert_array_equal(getattr(one, image), getattr(other, image))
 
 
+@pytest.mark.slow
 def test_leaving_out_changes_no_pixel_of_the_apartment(scene, navmesh, monkeypatch):
     data = mujoco.MjData(scene.model)
     mujoco.mj_forward(scene.model, data)

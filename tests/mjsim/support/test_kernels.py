@@ -84,6 +84,7 @@ def test_an_unrelated_edit_recompiles_nothing_and_unused_machine_code_goes(tmp_p
     assert len(new) == 3  # of the two modules, and of somebody else
 
 
+@pytest.mark.slow
 def test_kernels_work_where_nothing_can_be_cached(tmp_path):
     """Neither where no folder can be made, nor where numba refuses."""
     _project(tmp_path)

@@ -429,6 +429,7 @@ def test_people_with_several_trials_in_several_homes(tmp_path):
     assert "People have several trials in a cell" in report and "houses drawn again" in report
 
 
+@pytest.mark.slow
 def test_a_report_of_many_trials_stays_small_and_has_no_link(tmp_path):
     people = of_measures(made_up_people({("none", 6): 1050, ("optimal", 6): 1050}), "nd_feasible")
     write_tables(tmp_path, people)

@@ -58,6 +58,7 @@ def crowd(tmp_path, monkeypatch):
         yield site, client, links
 
 
+@pytest.mark.slow
 def test_people_wait_in_order_and_keep_their_place(crowd):
     site, client, links = crowd
     assert [place(client, link) for link in links] == [None, 1, 2, 3]

@@ -167,6 +167,7 @@ def test_every_route_lets_in_who_may_and_nobody_else(site):
     assert wrong == []
 
 
+@pytest.mark.slow
 def test_no_other_site_can_use_the_cookie_or_the_link_of_somebody(site):
     with contextlib.closing(site.logged_in("owner")) as client:
         token = new_person(site)
@@ -236,6 +237,7 @@ def test_nothing_that_is_uploaded_breaks_anything_or_stays(site, caplog):
     assert [record.getMessage() for record in caplog.records if record.levelno >= logging.ERROR] == []
 
 
+@pytest.mark.slow
 def test_what_people_write_is_kept_as_it_is_and_harms_nothing(tmp_path):
     words = {
         HOSTILE,

@@ -57,6 +57,7 @@ def spread(rule, abandoned_after):
     return np.mean([finished_by_cell(rule, seed, abandoned_after) for seed in range(50)])
 
 
+@pytest.mark.slow
 def test_balanced_assignment_with_release_differs_by_at_most_3_over_cells():
     with_release = spread("balanced", abandoned_after=30.0)
     assert with_release <= 3.0

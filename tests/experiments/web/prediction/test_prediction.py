@@ -36,6 +36,7 @@ def world(house: House) -> World:
     return World(scene, WorldOptions(fidelity="event"))
 
 
+@pytest.mark.slow
 def test_walking_on_generated_floors(world: World) -> None:
     """20 floors of convex obstacles, in which random walks touch, slide along and wedge between them."""
     gait = kinematics.Gait.of(world.scene, WorldOptions(fidelity="event"))
@@ -63,6 +64,7 @@ def test_walking_on_generated_floors(world: World) -> None:
         np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=DRIFT)
 
 
+@pytest.mark.slow
 def test_inputs_of_a_person_in_the_apartment(world: World) -> None:
     """Keys, mouse and refused presses at random lead to the same states as in a session."""
     cases, expected = [], []

@@ -33,6 +33,7 @@ def packed(page, name):
     return json.loads(gzip.decompress(base64.b64decode(content)))
 
 
+@pytest.mark.slow
 def test_every_module_that_is_imported_is_in_the_page(page):
     modules = json.loads(re.search(r'<script type="importmap">(.*?)</script>', page)[1])["imports"]
     assert {"view/view.js", "vendor/three.js", "hud.js"} <= modules.keys()

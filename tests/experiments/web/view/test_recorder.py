@@ -34,6 +34,7 @@ def seen(run):
     return found[0]
 
 
+@pytest.mark.slow
 def test_poses_are_those_of_the_trajectory(run, seen):
     trajectory, (recorder, _) = run[1].trajectory, seen
     steps = len(trajectory["time"])

@@ -90,6 +90,7 @@ def area(model, geom):
     return rounds[kind]().area
 
 
+@pytest.mark.slow
 def test_all_that_is_seen_is_there(compiled, house_parts):
     model, _ = compiled
     by_texture = {}

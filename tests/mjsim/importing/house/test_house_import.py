@@ -44,6 +44,7 @@ def flat(tmp_path_factory):
     return imported(folder, write_flat(folder))
 
 
+@pytest.mark.slow
 def test_an_sdf_world_becomes_a_house(flat):
     decisions, catalogue = flat
     assert list(catalogue.rooms.values()) == ["Living room", "Room 1"]
@@ -109,12 +110,14 @@ def test_the_same_scene_gives_the_same_bytes(flat, tmp_path):
     assert written[0] == written[1]
 
 
+@pytest.mark.slow
 def test_without_walls_the_house_is_the_rectangle_of_its_floor(tmp_path):
     decisions, catalogue = imported(tmp_path, write_sdf(tmp_path, walls=False))
     assert decisions["outline"].startswith("a rectangle")
     assert len(catalogue.rooms) == 1
 
 
+@pytest.mark.slow
 def test_the_command_imports_and_reports_and_takes_rooms_and_a_name(tmp_path, capsys):
     rooms, out = tmp_path / "rooms.toml", tmp_path / "my house"
     rooms.write_text(
@@ -151,6 +154,7 @@ def test_gltf_and_obj_give_the_same_floor_and_an_obj_tells_its_unit_and_axes(tmp
     assert said["obj"]["unit"].startswith("cm")
 
 
+@pytest.mark.slow
 def test_a_closed_box_in_centimetres_is_a_room(tmp_path):
     trimesh.creation.box((400, 250, 500)).export(tmp_path / "room.glb")
     decisions, _ = imported(tmp_path, tmp_path / "room.glb")
@@ -158,6 +162,7 @@ def test_a_closed_box_in_centimetres_is_a_room(tmp_path):
     assert decisions["outline"].startswith("closed by its walls")
 
 
+@pytest.mark.slow
 def test_a_habitat_scene_is_a_stage_with_objects_in_their_places(tmp_path):
     decisions, catalogue = imported(tmp_path, write_habitat(tmp_path / "data"))
     assert "ball" in decisions["loose things"]
@@ -166,6 +171,7 @@ def test_a_habitat_scene_is_a_stage_with_objects_in_their_places(tmp_path):
     np.testing.assert_allclose(high, (2.25, 1.4, 0.9), atol=0.02)
 
 
+@pytest.mark.slow
 def test_an_mjcf_scene_stands_still_and_walls_that_were_only_seen_are_solid(tmp_path):
     decisions, catalogue = imported(tmp_path, write_mjcf(tmp_path))
     house = compiled_house(catalogue)

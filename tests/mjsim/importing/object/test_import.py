@@ -427,6 +427,7 @@ def test_four_that_fit_by_volume_but_not_beside_each_other_are_refused(tmp_path,
 OTHER_SIZES = ((0.26, 0.2, 0.04), (0.26, 0.1, 0.1), (0.12, 0.12, 0.17))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "size",
     [
@@ -452,6 +453,7 @@ def test_a_bin_holds_as_many_as_were_counted(size, tmp_path):
     assert [placement.outcome for placement in placements[:count]] == ["placed"] * count
 
 
+@pytest.mark.slow
 def test_a_surface_that_cuts_itself_is_known_and_does_not_take_minutes(tmp_path):
     """CoACD takes 40 s for parts of the usual fineness of this one."""
     ball = MAKE.icosphere(subdivisions=3, radius=0.07)
