@@ -153,9 +153,15 @@ class Markers(WireMessage, frozen=True):
 
 
 class Pictures(WireMessage, frozen=True):
-    """Pictures to which `hud` messages refer, as data URLs by key. Each page receives them once."""
+    """Pictures to which `hud` messages refer, as data URLs by key. Each page receives them once.
+
+    Attributes:
+        example: Labels of an object and its receptacle, by key, which the instructions show as an example. They depend
+            only on the house and the language, so that all conditions have the same instructions.
+    """
 
     pictures: dict[str, str]
+    example: dict[str, str]
 
 
 class Hud(WireMessage, frozen=True):
