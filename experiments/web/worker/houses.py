@@ -47,7 +47,7 @@ def shown_pictures(config: TrialConfig, catalogue: Catalogue) -> Pictures:
     """Return the pictures of a trial's house, with labels in the language of `catalogue`. This requires OpenGL."""
     category = next(one for one in catalogue.categories.values() if one.objects)
     model, receptacle = catalogue.objects[category.objects[0]], catalogue.receptacles[category.receptacle]
-    labels = {model.key: model.label, receptacle.key: receptacle.label}
+    labels = {f"object:{model.key}": model.label, f"receptacle:{receptacle.key}": receptacle.label}
     return Pictures(encoded_pictures(config.house, "minimap" in config.assistance), labels)
 
 

@@ -18,7 +18,13 @@ def test_the_instructions_are_the_same_in_all_conditions_and_for_all_participant
     for language, labels in (("en", ["Blue mug", "Dish bin"]), ("de", ["Blaue Tasse", "Geschirrkorb"])):
         catalogue = house.in_language(language).catalogue
         shown = {tuple(houses.shown_pictures(config, catalogue).example.items()) for config in configs}
-        assert shown == {tuple(zip(("mug", "dish_bin"), labels, strict=True))}
+        assert shown == {tuple(zip(("object:mug", "receptacle:dish_bin"), labels, strict=True))}
+
+
+@pytest.mark.slow
+def test_the_object_and_the_bin_of_the_instructions_have_pictures(house):
+    shown = houses.shown_pictures(TrialConfig(objects=3, assistance="none"), house.catalogue)
+    assert len(shown.example) == 2 and shown.example.keys() <= shown.pictures.keys()
 
 
 @pytest.mark.slow
