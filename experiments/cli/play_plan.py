@@ -100,7 +100,7 @@ def plan_of_play(
         trials,
         OpenLink(repeats=again),
         arguments.film,
-        poster(arguments.film),
+        poster(arguments.film) if arguments.film else "",
         view_path(load_catalogue(task.house), scenes_folder()),
         headset=arguments.xr,
         floor_plan=True,

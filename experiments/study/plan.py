@@ -60,7 +60,7 @@ def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None =
         trials,
         platform,
         film,
-        poster(film),
+        poster(film) if film else "",
         view_path(catalogue, scenes_folder()),
         rehearsal=study.rehearsal,
         film_required=settings.require_film,

@@ -155,9 +155,7 @@ class Markers(WireMessage, frozen=True):
 class Pictures(WireMessage, frozen=True):
     """Pictures to which `hud` messages refer, as data URLs by key. Each page receives them once.
 
-    Attributes:
-        example: Labels of an object and its receptacle, by key, which the instructions show as an example. They depend
-            only on the house and the language, so that all conditions have the same instructions.
+    `example` has the labels of an object and its receptacle, by key. It is the same in all conditions.
     """
 
     pictures: dict[str, str]

@@ -34,7 +34,6 @@ from mjsim.formats.gltf.store import scenes_folder
 LOG = logging.getLogger("mjsim.study")
 FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
 DRAWING_TIMEOUT = 60.0  # how long a request waits until the picture of the house is drawn, in seconds
-DRAWING_POLL = 0.2
 MAX_FORM = 64 * 1024  # maximum size of a submitted form, in bytes
 
 
@@ -186,7 +185,7 @@ class VisitServer:
     async def _picture(self, request: Request) -> Response:  # noqa: ARG002 - the same for all participants
         path, until = self._plan.picture, time.monotonic() + DRAWING_TIMEOUT
         while path is not None and not path.is_file() and time.monotonic() < until:
-            await asyncio.sleep(DRAWING_POLL)
+            await asyncio.sleep(0.2)
         if path is None or not path.is_file():
             return PlainTextResponse("not found\n", 404)
         return FileResponse(path, headers={"Cache-Control": CHECKED}, media_type="image/webp")

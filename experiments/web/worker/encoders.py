@@ -73,10 +73,8 @@ def data_url(picture: Image) -> str:
     return f"data:image/webp;base64,{base64.b64encode(data.tobytes()).decode()}"
 
 
-def poster(film: Path | None) -> str:
-    """Return the most detailed key frame of a film as a data URL, or an empty text if no film can be read."""
-    if film is None:
-        return ""
+def poster(film: Path) -> str:
+    """Return the most detailed key frame of a film as a data URL, or an empty text if the film cannot be read."""
     # Errors of FFmpeg are OSErrors or ValueErrors
     with suppress(OSError, ValueError, IndexError), film.open("rb") as file, av.open(file) as container:
         stream = container.streams.video[0]
