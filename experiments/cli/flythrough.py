@@ -65,9 +65,10 @@ def film_house(
     from experiments.house import House
     from experiments.session.film import write_flythrough
 
-    house = House.load(name)
-    with counting_bars("frames of the film") as bars:
-        bar = bars.add_task("frames", total=None)
+    with counting_bars("{task.description}") as bars:
+        bar = bars.add_task("loading the house", total=None)
+        house = House.load(name)
+        bars.update(bar, description="frames of the film")
         return write_flythrough(
             house.in_language(language, house.texts),  # captions contain no HUD texts
             path,

@@ -18,6 +18,9 @@ from experiments.visit.recruiter import OpenLink
 from experiments.visit.store import Assignment, CellQuota
 from experiments.visit.texts import Section, read_texts, story_file
 from experiments.visit.texts.items import Item
+from experiments.web.worker.encoders import poster
+from mjsim.formats.gltf.cache import view_path
+from mjsim.formats.gltf.store import scenes_folder
 from mjsim.generator.home_cache import load_catalogue
 
 NAME = "play"  # name under which `mjsim play` stores its study in the database
@@ -97,6 +100,8 @@ def plan_of_play(
         trials,
         OpenLink(repeats=again),
         arguments.film,
+        poster(arguments.film) if arguments.film else "",
+        view_path(load_catalogue(task.house), scenes_folder()),
         headset=arguments.xr,
         floor_plan=True,
     )

@@ -1,4 +1,4 @@
-"""Draw pictures of a tidy house: a floor plan with room names, and a view of each room."""
+"""Draw pictures of a tidy house: a floor plan with room names, and views of its rooms."""
 
 import math
 from collections.abc import Iterable
@@ -15,9 +15,11 @@ from mjsim.support.files import replacing
 from mjsim.values.person_parameters import PersonParameters
 
 SIZE = (960, 640)  # size of a picture in pixels
+WIDE = (1200, 600)  # size of the picture of the largest room, in pixels
 # Vertical field of view in radians, wider than a person's so that a corner view shows most of a room
 FIELD = math.radians(62.0)
 SCALE, MARGIN = 70.0, 0.4  # scale of the plan in pixels per metre, and the margin around it in metres
+WEBP = (cv2.IMWRITE_WEBP_QUALITY, 85)
 TEXT, LINE = 13, 16  # font size and line height on the plan, in pixels
 TARGET_HEIGHT = 0.9  # height in metres of the point in the middle of a room that the camera looks at
 PLACES = 3000  # number of sampled viewpoints
@@ -40,6 +42,25 @@ def draw_house(house: House, folder: Path) -> list[Path]:
             cv2.imwrite(str(temporary), picture[..., ::-1])
         paths.append(path)
     return paths
+
+
+def draw_largest_room(house: House, path: Path) -> None:
+    """Write a view of the largest room to a WebP file."""
+    (room,) = largest_rooms(house, 1)
+    view, compiled = room_views(house, [room])[room][0], compiled_house(house.catalogue)
+    with Renderer(compiled.model, width=WIDE[0], height=WIDE[1], profile="quality") as renderer:
+        picture = renderer.rgb(compiled.data, view)
+    with replacing(path) as temporary:
+        cv2.imwrite(str(temporary), picture[..., ::-1], WEBP)
+
+
+def largest_rooms(house: House, count: int) -> list[str]:
+    """Return the keys of the largest rooms in which a person has space to stand, largest first."""
+    rooms, areas = house.rooms, dict.fromkeys(house.viewpoints, 0.0)
+    for key, half in zip(rooms.keys, rooms.half_sizes, strict=True):
+        if key in areas:
+            areas[key] += float(half.prod())
+    return sorted(areas, key=lambda key: -areas[key])[:count]
 
 
 def floor_plan(house: House, within: tuple[int, int] | None = None) -> NDArray[np.uint8]:

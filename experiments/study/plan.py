@@ -15,6 +15,9 @@ from experiments.trials.training import trials_of
 from experiments.visit.plan import PLAYED, VisitPlan
 from experiments.visit.recruiter import Recruiter
 from experiments.visit.store import Assignment, CellQuota
+from experiments.web.worker.encoders import poster
+from mjsim.formats.gltf.cache import view_path
+from mjsim.formats.gltf.store import scenes_folder
 from mjsim.generator.home_cache import load_catalogue
 
 
@@ -28,6 +31,7 @@ def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None =
     platform = platform or recruiter(settings.recruitment)
     if study.rehearsal:
         platform.platform = REHEARSAL
+    catalogue = load_catalogue(study.cells[0].trials[0].house)
     endless = {name: math.inf for name in PLAYED if name not in settings.optional}
 
     def trials(place: Assignment) -> Mapping[str, dict[str, Any]]:
@@ -45,9 +49,7 @@ def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None =
         settings.language,
         settings.phases,
         study.texts,
-        with_names(
-            study.story, load_catalogue(study.cells[0].trials[0].house).in_language(settings.language)
-        ),
+        with_names(study.story, catalogue.in_language(settings.language)),
         {**settings.minimum, **endless},
         frozenset(settings.optional),
         settings.limits,
@@ -58,6 +60,8 @@ def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None =
         trials,
         platform,
         film,
+        poster(film) if film else "",
+        view_path(catalogue, scenes_folder()),
         rehearsal=study.rehearsal,
         film_required=settings.require_film,
         consent_version=settings.consent_version,

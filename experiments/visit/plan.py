@@ -64,6 +64,8 @@ class VisitPlan:
         minutes: Expected duration of a visit, in minutes.
         cells: Cells of the design. Each participant is assigned a place in one of them.
         trials: Function that returns the settings of the trials for an assignment, by phase.
+        poster: Data URL of the picture that the page of the film shows before the film is played, or an empty text.
+        picture: File of the picture on the welcome page, which workers may still be drawing, or None.
         headset: True if trials can be played with a VR headset.
         floor_plan: True if the run directory of the task includes a floor plan with the participant's path.
         rehearsal: True if all participants are simulated.
@@ -87,6 +89,8 @@ class VisitPlan:
     trials: Callable[[Assignment], Mapping[str, dict[str, Any]]]
     recruiter: Recruiter
     film: Path | None = None
+    poster: str = ""
+    picture: Path | None = None
     headset: bool = False
     floor_plan: bool = False
     rehearsal: bool = False

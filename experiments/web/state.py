@@ -153,9 +153,13 @@ class Markers(WireMessage, frozen=True):
 
 
 class Pictures(WireMessage, frozen=True):
-    """Pictures to which `hud` messages refer, as data URLs by key. Each page receives them once."""
+    """Pictures to which `hud` messages refer, as data URLs by key. Each page receives them once.
+
+    `example` has the labels of an object and its receptacle, by key. It is the same in all conditions.
+    """
 
     pictures: dict[str, str]
+    example: dict[str, str]
 
 
 class Hud(WireMessage, frozen=True):

@@ -15,7 +15,7 @@ class Film(FormPhase):
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
         """Return additional values for the page's template."""
-        return {"required": self._plan.film_required}
+        return {"required": self._plan.film_required, "poster": self._plan.poster}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
         """Validate a submitted form. Return its values, or the reason why the form is refused."""

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import time
 from collections.abc import AsyncIterator, Callable, Coroutine, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ from experiments.visit.server.pages import VisitPages
 from experiments.visit.server.trials import Trials
 from experiments.visit.store import Assignment, PersonRow
 from experiments.visit.tokens import TOKEN, Keys, token_hash
-from experiments.web.client_files import scene_route, static_routes
+from experiments.web.client_files import CHECKED, scene_route, static_routes
 from experiments.web.server.guards import Network, middleware, sent_form
 from experiments.web.server.player import Meter
 from experiments.web.server.pool import WorkerPool
@@ -32,6 +33,7 @@ from mjsim.formats.gltf.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.study")
 FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
+DRAWING_TIMEOUT = 60.0  # how long a request waits until the picture of the house is drawn, in seconds
 MAX_FORM = 64 * 1024  # maximum size of a submitted form, in bytes
 
 
@@ -79,6 +81,7 @@ class VisitServer:
         return Starlette(
             routes=[
                 Route("/", self._arrivals.welcome),
+                Route("/house.webp", self._picture),
                 Route("/begin", self._arrivals.begin, methods=["POST"]),
                 Route("/play/{token}", self._show),
                 Route("/play/{token}", self._submit, methods=["POST"]),
@@ -178,6 +181,14 @@ class VisitServer:
         if self._plan.film is None:
             return PlainTextResponse("not found\n", 404)
         return FileResponse(self._plan.film, headers=FILM_HEADERS, media_type="video/mp4")
+
+    async def _picture(self, request: Request) -> Response:  # noqa: ARG002 - the same for all participants
+        path, until = self._plan.picture, time.monotonic() + DRAWING_TIMEOUT
+        while path is not None and not path.is_file() and time.monotonic() < until:
+            await asyncio.sleep(0.2)
+        if path is None or not path.is_file():
+            return PlainTextResponse("not found\n", 404)
+        return FileResponse(path, headers={"Cache-Control": CHECKED}, media_type="image/webp")
 
     async def _floor_plan(self, request: Request) -> Response:
         person = await self._person(request)

@@ -14,7 +14,7 @@ import numpy as np
 from experiments.errors import ConfigError
 from experiments.house import House
 from experiments.session.camera_path import camera_path
-from experiments.session.house_pictures import floor_plan, room_views
+from experiments.session.house_pictures import WEBP, floor_plan, largest_rooms, room_views
 from experiments.web.viewing.page import run_page
 from hud.state import HudState, InventorySlot
 from mjsim.formats.gltf.export import export_scene
@@ -28,7 +28,6 @@ from mjsim.values.person_parameters import PersonParameters
 
 PLAN, VIEW = (480, 400), (300, 200)  # width and height of the floor plan and of a view, in pixels
 PAGE, ABOUT = "index.html", "home.json"
-_WEBP = (cv2.IMWRITE_WEBP_QUALITY, 85)
 INTERVAL = 0.2  # interval between poses of the tour, in seconds; the page interpolates between them
 NEAR = 0.05  # distance at which a viewpoint counts as reached, in metres
 INSIDE = (0.0, 0.0, 0.8) * 2  # positions of both hands in metres, which hide them inside the body
@@ -117,20 +116,15 @@ def draw_home(name: str, folder: Path) -> GalleryHome:
 
 
 def _draw(house: House, folder: Path) -> tuple[str, ...]:
-    compiled, rooms = compiled_house(house.catalogue), house.rooms
-    areas = dict.fromkeys(house.viewpoints, 0.0)
-    for key, half in zip(rooms.keys, rooms.half_sizes, strict=True):
-        if key in areas:  # true for rooms in which a person has space to stand
-            areas[key] += float(half.prod())
-    largest = sorted(areas, key=lambda key: -areas[key])[:2]
-    views = list(room_views(house, largest).values())
+    compiled = compiled_house(house.catalogue)
+    views = list(room_views(house, largest_rooms(house, 2)).values())
     cameras = views[0][:2] if len(views) == 1 else [views[0][0], views[1][0]]
     pictures = {"plan.webp": floor_plan(house, PLAN)}
     with Renderer(compiled.model, width=2 * VIEW[0], height=2 * VIEW[1], profile="quality") as renderer:
         for number, camera in enumerate(cameras, 1):
             pictures[f"view_{number}.webp"] = renderer.rgb(compiled.data, camera)
     for name, picture in pictures.items():
-        cv2.imwrite(str(folder / name), np.ascontiguousarray(picture[..., ::-1]), _WEBP)
+        cv2.imwrite(str(folder / name), np.ascontiguousarray(picture[..., ::-1]), WEBP)
     return tuple(pictures)
 
 

@@ -117,7 +117,7 @@ def _scene(house: House, models: set[str]) -> dict[str, bytes]:
     found = {}
     for path in sorted(folder.rglob("*.*")):
         name = path.relative_to(folder).as_posix().removesuffix(GZIP)
-        if Path(name).stem in models or not name.startswith(("objects/", "floor")):
+        if Path(name).stem in models or not name.startswith(("objects/", "floor", "view")):
             content = path.read_bytes()
             found[name] = gzip.decompress(content) if path.suffix == GZIP else content
     return found

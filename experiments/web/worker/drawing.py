@@ -45,7 +45,7 @@ class Drawer:
     def __init__(
         self,
         scene: Scene,
-        pictures: Callable[[], dict[str, str]],
+        pictures: Callable[[], Pictures],
         send: Send,
         control: SessionControl,
     ) -> None:
@@ -117,7 +117,7 @@ class Drawer:
                 encoder, encoded_for = _encoder(job.view, size.index), (job.view, size.index)
                 job = job._replace(key=True)
             if job.view is not shown_to:
-                self._send(Pictures(self._pictures()))
+                self._send(self._pictures())
                 shown_to = job.view
             image = self._renderer(size.index).rgb(job.moment.data, markers=job.moment.markers)
             if job.moment.hidden:

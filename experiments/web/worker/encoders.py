@@ -4,6 +4,8 @@ import base64
 import statistics
 import time
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 from typing import Any, Protocol
 
 import av
@@ -69,6 +71,18 @@ def data_url(picture: Image) -> str:
         ".webp", cv2.cvtColor(picture, cv2.COLOR_RGBA2BGRA), [cv2.IMWRITE_WEBP_QUALITY, 85]
     )
     return f"data:image/webp;base64,{base64.b64encode(data.tobytes()).decode()}"
+
+
+def poster(film: Path) -> str:
+    """Return the most detailed key frame of a film as a data URL, or an empty text if the film cannot be read."""
+    # Errors of FFmpeg are OSErrors or ValueErrors
+    with suppress(OSError, ValueError, IndexError), film.open("rb") as file, av.open(file) as container:
+        stream = container.streams.video[0]
+        keys = [packet for packet in container.demux(stream) if packet.is_keyframe]
+        codec = stream.codec_context
+        frames = [*codec.decode(max(keys, key=lambda key: key.size)), *codec.decode(None)]
+        return data_url(frames[0].to_ndarray(format="rgba"))
+    return ""
 
 
 SIZES = ((320, 240), (480, 360), (640, 480), (800, 600), (960, 720))  # possible frame sizes, in pixels

@@ -8,11 +8,15 @@ from contextlib import suppress
 from multiprocessing import get_context
 
 from experiments.house import House
+from experiments.session.house_pictures import draw_largest_room
 from experiments.trials import warmup
+from experiments.trials.trial_config import TrialConfig
+from experiments.web.state import Pictures
 from experiments.web.worker.encoders import Image, data_url
 from hud.state import FLOORPLAN
-from mjsim.formats.gltf.cache import cached_floor, cached_scene
+from mjsim.formats.gltf.cache import cached_floor, cached_scene, view_path
 from mjsim.formats.gltf.store import scenes_folder
+from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.render import render_house_map, render_pictures
 
 DRAWING_TIMEOUT = 60.0  # timeout for drawing the pictures, in seconds
@@ -39,6 +43,14 @@ def encoded_pictures(name: str, floor_plan: bool) -> dict[str, str]:
     return {key: data_url(picture) for key, picture in found.items()}
 
 
+def shown_pictures(config: TrialConfig, catalogue: Catalogue) -> Pictures:
+    """Return the pictures of a trial's house, with labels in the language of `catalogue`. This requires OpenGL."""
+    category = next(one for one in catalogue.categories.values() if one.objects)
+    model, receptacle = catalogue.objects[category.objects[0]], catalogue.receptacles[category.receptacle]
+    labels = {f"object:{model.key}": model.label, f"receptacle:{receptacle.key}": receptacle.label}
+    return Pictures(encoded_pictures(config.house, "minimap" in config.assistance), labels)
+
+
 def scene_files(house: House) -> tuple[str, str]:
     """Return the URL paths of a house's scene and floor file. Missing files are created, which takes seconds.
 
@@ -51,15 +63,23 @@ def scene_files(house: House) -> tuple[str, str]:
     return folder, folder + cached_floor(house.catalogue, scene, house.person.body_radius)
 
 
+def make_files(house: House) -> None:
+    """Create the scene files and the picture on the welcome page, unless they exist."""
+    scene_files(house)
+    path = view_path(house.catalogue, scenes_folder())
+    if not path.is_file():
+        draw_largest_room(house, path)
+
+
 def preload(name: str) -> None:
     """Load a house, its pictures and the compiled kernels before workers are forked. Errors are ignored.
 
     Threads and OpenGL contexts do not survive a fork. One child process therefore draws the pictures, and
-    another one exports the scene.
+    another one exports the scene and then draws the welcome page's picture.
     """
     with suppress(Exception):
         loaded = house(name)
-        _begin(scene_files, loaded)
+        _begin(make_files, loaded)
         with get_context("fork").Pool(1) as drawing:
             drawn = drawing.apply_async(render_pictures, (loaded.catalogue,))
             warmup.compile_kernels(loaded)  # also caches hashes and versions

@@ -128,7 +128,7 @@ class Worker:
                     language=opened.language,
                     texts=_texts(opened),
                 )
-                pictures = partial(houses.encoded_pictures, config.house, "minimap" in config.assistance)
+                pictures = partial(houses.shown_pictures, config, live.shown.catalogue)
                 with closing(Drawer(live.scene, pictures, self._send, control)) as drawer:
                     viewer.live, viewer.drawer = live, drawer
                     viewer.set_view(None)

@@ -11,7 +11,7 @@ import numpy as np
 from experiments.session.session import Viewer
 from experiments.web.controls import act
 from experiments.web.protocol import View
-from experiments.web.state import Busy, Hud, Markers, Moment, Pictures, Reach, WireMessage
+from experiments.web.state import Busy, Hud, Markers, Moment, Reach, WireMessage
 from experiments.web.worker import houses
 from experiments.web.worker.clock import Send
 from experiments.web.worker.drawing import Drawer
@@ -121,8 +121,7 @@ class BrowserViewer(Viewer):
         if view.codec == "none":
             self._snapshots = SnapshotStream(live, view)
             self._send(scene_of(live, view))
-            floor_plan = "minimap" in live.config.assistance
-            self._send(Pictures(houses.encoded_pictures(live.config.house, floor_plan)))
+            self._send(houses.shown_pictures(live.config, live.shown.catalogue))
 
     def _beside(
         self, live: LiveSession, seen: Observation, state: HudState, step: int

@@ -50,6 +50,11 @@ def cached_scene(catalogue: Catalogue, folder: Path) -> Path:
     return target
 
 
+def view_path(catalogue: Catalogue, folder: Path) -> Path:
+    """Return the path of a picture of a house. The picture is stored with the scene files, but drawn separately."""
+    return folder / scene_hash(catalogue) / "view.webp"
+
+
 def cached_floor(catalogue: Catalogue, scene: Path, body_radius: float) -> str:
     """Return the name of the floor data file for a trunk radius in metres. Write the file if it is missing.
 

@@ -5,6 +5,7 @@ import io
 from rich.console import Console
 from rich.progress import Progress
 
+from experiments.cli.flythrough import film_house
 from experiments.cli.progress_lines import INTERVAL_S, ProgressLines
 from experiments.cli.terminal import progress_bars
 
@@ -38,3 +39,29 @@ def test_only_terminals_get_bars():
     assert isinstance(progress_bars(Console(file=io.StringIO())), ProgressLines)
     bars = progress_bars(Console(file=io.StringIO(), force_terminal=True))
     assert type(bars) is Progress and not bars.disable
+
+
+def test_a_terminal_shows_that_the_house_of_a_film_is_loading(monkeypatch, capsys, tmp_path):
+    monkeypatch.setenv("FORCE_COLOR", "1")  # a terminal, to rich
+    shown = []
+
+    class Loaded:
+        texts = None
+
+        def in_language(self, *_):
+            return self
+
+    def load(_name):
+        shown.append(capsys.readouterr().err)
+        return Loaded()
+
+    def write(*_, on_progress, **__):
+        on_progress(3, 7)
+        return "digest"
+
+    monkeypatch.setattr("experiments.house.House.load", load)
+    monkeypatch.setattr("experiments.session.film.write_flythrough", write)
+    assert film_house("apartment", tmp_path / "film.mp4") == "digest"
+    last = capsys.readouterr().err
+    assert "loading the house" in shown[0]
+    assert "frames of the film" in last and "3/7" in last

@@ -73,6 +73,11 @@ export class Bindings {
     return this.#keys.get(name)?.map(keyName).join(` ${textOf("or")} `) || textOf("no_key");
   }
 
+  /** Returns the name of an action's first key. @param {string} name of the action */
+  key(name) {
+    return this.#keys.get(name)?.map(keyName)[0] ?? textOf("no_key");
+  }
+
   /**
    * Assigns a key to an action. Any other action loses it.
    * @param {Action} action

@@ -4,7 +4,14 @@
 
 import { textOf } from "./texts.js";
 
-/** @typedef {{ title: string, texts: string[], buttons?: [string, string][] }} Dialog buttons: label and action */
+/**
+ * @typedef {object} Dialog
+ * @property {string} title
+ * @property {string[]} texts
+ * @property {[string, string][]} [pictures] address and label
+ * @property {[string[], string][]} [keys] names of keys, and their effect
+ * @property {[string, string][]} [buttons] label and action
+ */
 
 /**
  * A dialog of a title, a text and at most one button.
@@ -24,34 +31,33 @@ export const loading = (interrupted, late) =>
 /**
  * @param {string} trial
  * @param {number} objects
- * @param {string} controls
  * @param {boolean} skippable
+ * @param {[string, string][]} pictures addresses and labels of an object and its bin
+ * @param {((action: string) => string) | null} key name of an action's key; null for touch screens
  * @returns {Dialog}
  */
-export function instructions(trial, objects, controls, skippable) {
-  if (trial === "training") {
-    return {
-      title: textOf("training"),
-      texts: [textOf("training_text"), controls],
-      buttons: [[textOf("start_training"), "run"], ...(skippable ? skip() : [])],
-    };
-  }
+export function instructions(trial, objects, skippable, pictures, key) {
   const task = objects === 1 ? textOf("task_one") : textOf("task_many", { count: objects });
+  const shown = trial === "training" ? textOf("training_text") : `${task} ${textOf("clock_starts")}`;
   return {
-    title: textOf("task"),
-    texts: [`${task} ${textOf("clock_starts")}`],
-    buttons: [[textOf("start"), "run"]],
+    title: textOf(trial),
+    texts: key ? [shown] : [shown, textOf("touch_text")],
+    pictures,
+    keys: key ? keysOf(key) : [],
+    buttons: trial === "training" ? [[textOf("start_training"), "run"], ...(skippable ? skip() : [])] : [[textOf("start"), "run"]],
   };
 }
 
 /** @returns {[string, string][]} */
 const skip = () => [[textOf("skip_training"), "leave"]];
 
-/** @param {(action: string) => string} key names of the keys of an action */
-export function keyControls(key) {
-  const names = ["forward", "left", "back", "right", "turnLeft", "turnRight", "act", "help"];
-  return textOf("keys_text", Object.fromEntries(names.map((name) => [name, key(name)])));
-}
+/** @param {(action: string) => string} key name of an action's key @returns {[string[], string][]} */
+const keysOf = (key) => [
+  [["forward", "left", "back", "right"].map(key), textOf("keys_walk")],
+  [["turnLeft", "turnRight"].map(key), textOf("keys_turn")],
+  [[key("act")], textOf("action_act")],
+  [[key("help")], textOf("keys_help")],
+];
 
 /** @param {string} reason */
 export const paused = (reason) => dialog("paused", `paused_${reason.replace(" ", "_")}`, "next", "run");

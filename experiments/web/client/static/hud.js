@@ -15,6 +15,8 @@ const SYMBOLS = { info: "ℹ", success: "✓", refusal: "✕" };
 export class Hud {
   /** @type {Map<string, HTMLImageElement>} */
   #pictures = new Map();
+  /** @type {[string, string][]} */
+  example = []; // addresses and labels of the pictures in the instructions
   /** @type {Moment[]} */
   #waiting = [];
   /** @type {HudState | null} */
@@ -31,7 +33,8 @@ export class Hud {
   }
 
   /** @param {Pictures} message */
-  learn({ pictures }) {
+  learn({ pictures, example }) {
+    this.example = Object.entries(example).map(([key, label]) => [pictures[key] ?? "", label]);
     for (const [key, address] of Object.entries(pictures)) {
       const image = new Image();
       image.alt = ""; // the label next to it has the name

@@ -1,8 +1,9 @@
-// The dialog in the middle of the page: a title, sentences, and buttons.
+// The dialog in the middle of the page: a title, sentences, pictures, keys, and buttons.
 
 /** @import { Dialog } from "./dialogs.js" */
 
 import { made, within } from "./dom.js";
+import { textOf } from "./texts.js";
 
 export class Panel {
   #dialog;
@@ -32,12 +33,13 @@ export class Panel {
 
   /** @param {Dialog} dialog */
   show(dialog) {
-    const { title, texts, buttons = [] } = dialog;
-    const content = JSON.stringify(dialog);
-    if (content === this.#shown && this.open) return; // a button keeps its focus
-    this.#shown = content;
+    const { title, texts, pictures = [], keys = [], buttons = [] } = dialog;
+    const described = JSON.stringify(dialog);
+    if (described === this.#shown && this.open) return; // a button keeps its focus
+    this.#shown = described;
     within(this.#dialog, "h2", HTMLElement).textContent = title;
-    within(this.#dialog, "#panel-text", HTMLElement).replaceChildren(...texts.map((text) => made("p", text)));
+    const content = [...texts.map((text) => made("p", text)), ...example(pictures), ...keyCaps(keys)];
+    within(this.#dialog, "#panel-text", HTMLElement).replaceChildren(...content);
     const elements = buttons.map(([label, action], i) => {
       const button = made("button", label);
       button.type = "button";
@@ -55,4 +57,32 @@ export class Panel {
     this.#dialog.close();
     this.#closed();
   }
+}
+
+/** Shows what belongs where. @param {[string, string][]} pictures addresses and labels */
+function example(pictures) {
+  if (!pictures.length) return [];
+  const row = made("p", textOf("example"));
+  row.className = "example";
+  const figures = pictures.map(([address, label]) => {
+    const figure = made("span", label);
+    figure.prepend(Object.assign(new Image(), { src: address, alt: "" })); // the label has the name
+    return figure;
+  });
+  row.append(...figures.flatMap((figure, i) => (i ? [" → ", figure] : [" ", figure])));
+  return [row];
+}
+
+/** Draws key caps with their effect. @param {[string[], string][]} keys */
+function keyCaps(keys) {
+  if (!keys.length) return [];
+  const list = made("dl", "");
+  list.className = "keys";
+  for (const [names, effect] of keys) {
+    const [group, caps] = [made("div", ""), made("dt", "")];
+    caps.append(...names.flatMap((name) => [made("kbd", name), " "]));
+    group.append(caps, made("dd", effect));
+    list.append(group);
+  }
+  return [list];
 }

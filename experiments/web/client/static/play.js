@@ -216,8 +216,8 @@ function report() {
 
 function instructions() {
   const touch = matchMedia("(pointer: coarse)").matches;
-  const controls = touch ? textOf("touch_text") : dialogs.keyControls((name) => bindings.label(name));
-  return dialogs.instructions(trial, Number(objects), controls, performance.now() >= endable);
+  const key = touch ? null : (/** @type {string} */ name) => bindings.key(name);
+  return dialogs.instructions(trial, Number(objects), performance.now() >= endable, hud.example, key);
 }
 
 function run() {

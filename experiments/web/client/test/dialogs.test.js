@@ -13,8 +13,8 @@ describe("dialogs", () => {
   });
 
   test("count objects", () => {
-    expect(dialogs.instructions("task", 1, "", true).texts[0]).toContain("the object into its bin");
-    expect(dialogs.instructions("task", 6, "", true).texts[0]).toContain("all 6 objects into their bins");
+    expect(dialogs.instructions("task", 1, true, [], null).texts[0]).toContain("the object into its bin");
+    expect(dialogs.instructions("task", 6, true, [], null).texts[0]).toContain("all 6 objects into their bins");
   });
 
   test("congratulate on nothing but the whole task", () => {
@@ -22,15 +22,22 @@ describe("dialogs", () => {
     for (const reason of ["interrupted", "time limit"]) expect(dialogs.over(reason, true).title).not.toContain("one");
   });
 
-  test("explain the controls in the training", () => {
-    expect(dialogs.instructions("training", 1, dialogs.keyControls((name) => `<${name}>`), true).texts[1]).toContain("<act> picks up");
+  test.each(["training", "task"])("explain the controls before the %s, on touch screens in words", (trial) => {
+    const { keys = [], texts } = dialogs.instructions(trial, 1, true, [], (name) => `<${name}>`);
+    expect(keys).toContainEqual([["<forward>", "<left>", "<back>", "<right>"], "Walk"]);
+    expect(keys).toContainEqual([["<act>"], "Pick up or place"]);
+    const touch = dialogs.instructions(trial, 1, true, [], null);
+    expect([texts.length, touch.keys, touch.texts[1]]).toEqual([1, [], expect.stringContaining("lower left")]);
+  });
+
+  test("say whether the page was interrupted", () => {
     expect(dialogs.loading(true).texts).not.toEqual(dialogs.loading(false).texts);
   });
 
   test("offer no end of a training before its time", () => {
     const ends = (/** @type {dialogs.Dialog} */ { buttons = [] }) => buttons.some(([, action]) => action === "leave");
     for (const early of [true, false]) {
-      expect(ends(dialogs.instructions("training", 1, "", !early))).toBe(!early);
+      expect(ends(dialogs.instructions("training", 1, !early, [], null))).toBe(!early);
       expect(ends(dialogs.ending(early ? 12 : 0))).toBe(!early);
     }
     expect(dialogs.ending(12).texts[0]).toContain("in 12 s");

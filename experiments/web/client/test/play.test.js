@@ -2,7 +2,7 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 
 import { REPLACED, TOO_MUCH } from "../static/protocol.js";
-import { FakeSocket, frame, showPage, watchListeners } from "./page.js";
+import { FakeSocket, TEXTS, frame, showPage, watchListeners } from "./page.js";
 import { EMPTY, GAIT, SPEEDS } from "./walks.js";
 
 // Every test reloads the page, except for these modules.
@@ -24,6 +24,7 @@ const HUD = {
 
 /** @param {string} id */
 const part = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+const caps = () => [...part("panel-text").querySelectorAll("kbd")].map((cap) => cap.textContent);
 const title = () => (/** @type {HTMLDialogElement} */ (part("panel")).open ? part("panel-title").textContent : null);
 /** Chooses a button of the dialog. @param {string} label */
 const choose = (label) => [...part("panel-actions").querySelectorAll("button")].find((button) => button.textContent === label)?.click();
@@ -109,13 +110,35 @@ describe("a trial", () => {
     expect(title()).toBe("Your task");
   });
 
-  test("explains the keys in the training, which may be skipped", async () => {
+  test("shows the keys of the training, which may be skipped", async () => {
     await opened({ trial: "training" });
     socket().state("ready");
     socket().onmessage({ data: frame({ number: 1 }) });
-    expect(part("panel-text").textContent).toContain("Walk with W or ↑, A, S or ↓, D");
+    expect(caps()).toEqual(["W", "A", "S", "D", "←", "→", "E", "H"]);
     choose("Skip the training");
     expect(socket().all("leave")).toHaveLength(1);
+  });
+
+  test.each(["training", "task"])("shows an object, its bin and the participant's own keys before the %s", async (trial) => {
+    localStorage.setItem("mjsim-keys", JSON.stringify({ act: ["Space"], help: [] }));
+    await opened({ trial });
+    socket().receive({ type: "pictures", pictures: { mug: "data:,mug", dish_bin: "data:,bin" }, example: { mug: "Mug", dish_bin: "Dish bin" } });
+    socket().state("ready");
+    socket().onmessage({ data: frame({ number: 1 }) });
+    await settled();
+    expect([...part("panel-text").querySelectorAll("img")].map(({ src, alt }) => [src, alt])).toEqual([["data:,mug", ""], ["data:,bin", ""]]);
+    expect(part("panel-text").querySelector(".example")?.textContent).toBe("An example: Mug → Dish bin");
+    expect(caps().slice(-2)).toEqual(["Space", "none"]);
+  });
+
+  test("explains the gestures of a touch screen in words", async () => {
+    vi.stubGlobal("matchMedia", () => ({ matches: true }));
+    await opened();
+    socket().state("ready");
+    socket().onmessage({ data: frame({ number: 1 }) });
+    await settled();
+    expect([caps(), part("panel-text").lastChild?.textContent]).toEqual([[], TEXTS.touch_text]);
+    vi.stubGlobal("matchMedia", () => ({ matches: false }));
   });
 
   test("is ended by hand after its time only", async () => {
@@ -169,7 +192,7 @@ describe("while the clock runs", () => {
 
   test("the display shows what the server tells", async () => {
     await running();
-    socket().receive({ type: "pictures", pictures: {} });
+    socket().receive({ type: "pictures", pictures: {}, example: {} });
     socket().receive({ type: "hud", state: HUD });
     socket().receive({ type: "moment", step: 5, clock: 61, room: "Kitchen", reach: REACH, pointer: { angle: Math.PI / 2 }, minimap: null });
     socket().onmessage({ data: frame({ number: 2, step: 4 }) });

@@ -121,7 +121,7 @@ describe("film", () => {
   /** @param {string} required @param {Record<string, unknown>} film */
   async function submitted(required, film) {
     vi.resetModules();
-    document.body.innerHTML = `<form><video ${required}></video><p id="unplayed" hidden></p>
+    document.body.innerHTML = `<form><video ${required}></video><button id="play-film" type="button" hidden></button><p id="unplayed" hidden></p>
       ${["played_s", "film_s", "film_error"].map((name) => `<input type="hidden" name="${name}">`).join("")}</form>`;
     const ranges = { length: 2, start: (/** @type {number} */ i) => [0, 50][i], end: (/** @type {number} */ i) => [40, 80][i] };
     const video = document.querySelector("video");
@@ -131,6 +131,20 @@ describe("film", () => {
     document.querySelector("form")?.dispatchEvent(event);
     return [event.defaultPrevented, document.getElementById("unplayed")?.hidden];
   }
+
+  test("starts with a button, which is hidden once the film plays or cannot be played", async () => {
+    for (const event of ["play", "error"]) {
+      await submitted("", {});
+      const [video, button] = [document.querySelector("video"), document.getElementById("play-film")];
+      if (!video || !button) throw new Error("no film");
+      const play = vi.spyOn(video, "play").mockResolvedValue();
+      expect(button.hidden).toBe(false);
+      button.click();
+      expect(play).toHaveBeenCalledOnce();
+      video.dispatchEvent(new Event(event));
+      expect(button.hidden).toBe(true);
+    }
+  });
 
   test("reports how much was played", async () => {
     expect(await submitted("", {})).toEqual([false, true]);

@@ -26,10 +26,11 @@ PHASES = 'phases = ["consent", "task", "survey", "completion"]\n'
 EVERYBODY = {"nobody", "participant", "other participant", *ROLES}
 PARTICIPANT, NOBODY = {"participant"}, set()
 ASSISTANTS, OWNER = {"assistant", "owner"}, {"owner"}
-STATIC, SCENE = ("GET", "/static"), ("GET", "/scene/{hash}/{name:path}")
+PICTURE, STATIC, SCENE = ("GET", "/house.webp"), ("GET", "/static"), ("GET", "/scene/{hash}/{name:path}")
 # Who is let in. A new route needs a row here: decide who may do what it does.
 PEOPLE = {
     ("GET", "/"): EVERYBODY,
+    PICTURE: EVERYBODY,
     ("POST", "/begin"): EVERYBODY,
     ("GET", "/play/{token}"): PARTICIPANT,
     ("POST", "/play/{token}"): PARTICIPANT,
@@ -126,10 +127,12 @@ def _without_login(answer):
 
 
 def scene_file(site):
-    """A file of a scene that there is."""
-    from experiments.web.worker.houses import house, scene_files
+    """A file of a scene that there is; the picture of its house is there as well."""
+    from experiments.web.worker.houses import house, make_files, scene_files
 
-    path, _ = scene_files(house(site.study.cells[0].trial(0).house))
+    shown = house(site.study.cells[0].trial(0).house)
+    make_files(shown)
+    path, _ = scene_files(shown)
     return f"{path}scene.json"
 
 

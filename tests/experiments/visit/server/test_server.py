@@ -4,6 +4,7 @@ import dataclasses
 import hashlib
 import re
 import sqlite3
+import threading
 from contextlib import closing, contextmanager
 
 import msgspec
@@ -216,6 +217,31 @@ def test_a_film_that_is_required_is_played(tmp_path, study, sent, follows, kept)
     with closing(sqlite3.connect(tmp_path / "study.db")) as database:
         played = dict(database.execute("SELECT item, value FROM answer WHERE phase = 'flythrough' AND final"))
     assert played == kept
+
+
+def test_the_welcome_page_waits_for_the_picture_of_the_house(tmp_path, study, monkeypatch):
+    picture, unfinished = tmp_path / "view.webp", tmp_path / "unfinished"
+    monkeypatch.setattr("experiments.study.plan.view_path", lambda *_: picture)
+    with serving(tmp_path, study) as client:
+        assert 'src="/house.webp" alt="The largest room of the apartment"' in client.get("/").text
+        with monkeypatch.context() as impatient:
+            impatient.setattr("experiments.visit.server.app.DRAWING_TIMEOUT", 0.0)
+            assert client.get("/house.webp").status_code == 404
+        unfinished.write_bytes(b"a picture")
+        drawing = threading.Timer(0.5, lambda: unfinished.rename(picture))
+        drawing.start()
+        answer = client.get("/house.webp")
+        drawing.join()
+    assert (answer.content, answer.headers["content-type"]) == (b"a picture", "image/webp")
+    assert answer.headers["cache-control"] == "no-cache"  # another house may be served next
+
+
+def test_the_film_shows_its_poster(tmp_path, study, monkeypatch):
+    monkeypatch.setattr("experiments.study.plan.poster", lambda film: f"data:,{film.name}")
+    with serving(tmp_path, study) as client:
+        link = begin(client)
+        go_to(client, link, study, "flythrough")
+        assert 'poster="data:,film.mp4"' in client.get(link).text
 
 
 def test_how_much_of_the_film_was_played_is_kept_also_if_it_is_not_required(client, study, tmp_path):

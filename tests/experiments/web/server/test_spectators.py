@@ -34,7 +34,7 @@ def watched(*messages):
 def test_who_comes_later_is_told_what_is_known_by_then():
     spectators = watched(
         SCENE,
-        Pictures({}),
+        Pictures({}, {}),
         State(RUNNING),
         snapshot(1, {"cup": [1.0], "book": [2.0]}, {"cup": "mug", "book": "novel"}),
         snapshot(2, {"cup": [3.0]}, gone=["book"]),
@@ -42,7 +42,7 @@ def test_who_comes_later_is_told_what_is_known_by_then():
     )
     page = Page()
     spectators.join(page)
-    assert page.told == [State(RUNNING), SCENE, Pictures({}), snapshot(2, {"cup": [3.0]}, {"cup": "mug"})]
+    assert page.told == [State(RUNNING), SCENE, Pictures({}, {}), snapshot(2, {"cup": [3.0]}, {"cup": "mug"})]
     spectators.tell(following := snapshot(3, {"cup": [4.0]}))
     spectators.tell(Taken(8, 3))
     assert page.told[4:] == [following]

@@ -1,4 +1,4 @@
-// Reports how much of the film was played, and asks the participant to play a film that is required.
+// Plays the film, reports how much of it was played, and asks the participant to play a film that is required.
 
 import "./form.js";
 
@@ -8,6 +8,11 @@ const ENOUGH = 0.95; // fraction of a required film that must be played, as on t
 
 const form = within(document, "form", HTMLFormElement);
 const film = within(form, "video", HTMLVideoElement);
+
+const play = byId("play-film", HTMLButtonElement);
+play.hidden = false;
+play.addEventListener("click", () => film.play().then(() => film.focus(), () => {})); // the video reports errors itself
+for (const event of ["play", "error"]) film.addEventListener(event, () => (play.hidden = true));
 
 /** @param {string} name @param {string} value */
 const tell = (name, value) => (within(form, `[name=${name}]`, HTMLInputElement).value = value);

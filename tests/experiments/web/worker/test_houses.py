@@ -1,0 +1,41 @@
+"""What is made once per house: pictures for the instructions, and one for the welcome page."""
+
+import cv2
+import pytest
+
+from experiments.trials.trial_config import TrialConfig
+from experiments.web.viewing import page
+from experiments.web.worker import houses
+from mjsim.formats.gltf.cache import view_path
+
+
+def test_the_instructions_are_the_same_in_all_conditions_and_for_all_participants(house, monkeypatch):
+    monkeypatch.setattr(houses, "encoded_pictures", lambda *_: {})
+    conditions = ("none", "highlight", "optimal-minimap", "guided-xray")
+    configs = [
+        TrialConfig(assistance=name, objects=3 + seed, seed=seed) for seed, name in enumerate(conditions)
+    ]
+    for language, labels in (("en", ["Blue mug", "Dish bin"]), ("de", ["Blaue Tasse", "Geschirrkorb"])):
+        catalogue = house.in_language(language).catalogue
+        shown = {tuple(houses.shown_pictures(config, catalogue).example.items()) for config in configs}
+        assert shown == {tuple(zip(("object:mug", "receptacle:dish_bin"), labels, strict=True))}
+
+
+@pytest.mark.slow
+def test_the_object_and_the_bin_of_the_instructions_have_pictures(house):
+    shown = houses.shown_pictures(TrialConfig(assistance="none", objects=3, seed=0), house.catalogue)
+    assert len(shown.example) == 2 and shown.example.keys() <= shown.pictures.keys()
+
+
+@pytest.mark.slow
+def test_the_picture_of_a_house_is_drawn_once_and_is_no_part_of_its_scene(tmp_path, house, monkeypatch):
+    for module in (houses, page):
+        monkeypatch.setattr(module, "scenes_folder", lambda: tmp_path)
+    houses.make_files(house)
+    path = view_path(house.catalogue, tmp_path)
+    picture, drawn = cv2.imread(str(path)), path.stat().st_mtime_ns
+    assert picture.shape == (600, 1200, 3) and picture.std() > 30.0
+    houses.make_files(house)
+    assert path.stat().st_mtime_ns == drawn
+    files = page._scene(house, set())
+    assert "scene.json" in files and path.name not in files
