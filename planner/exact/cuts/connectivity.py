@@ -27,7 +27,8 @@ class Cut(NamedTuple):
         """Return the coefficient of each arc in the cut, whose sum over a tour is at least 0."""
         into = self.inside[graph.head]
         entering = (into & ~self.inside[graph.tail]).astype(np.int64)
-        return entering - (into & (graph.picks == self.object))
+        entering -= into & (graph.picks == self.object)
+        return entering
 
 
 def violated(graph: StateGraph, flow: NDArray[np.float64], deadline: Deadline) -> list[Cut]:

@@ -5,7 +5,7 @@ visits the nodes of each object exactly once. It is therefore a unit flow from t
 of each object once and is connected.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,8 @@ class StateGraph(NamedTuple):
 
     def only(self, arcs: NDArray[np.bool_]) -> "StateGraph":
         """Return the graph with a subset of the arcs and the same nodes."""
-        fields = (self.tail, self.head, self.length, self.most, self.picks)
-        return StateGraph(*(field[arcs] for field in fields), *self[5:])
+        tail, head, length, most, picks = (field[arcs] for field in self[:5])
+        return StateGraph(tail, head, length, most, picks, *self[5:])
 
 
 def merged(instance: Instance) -> Instance:
@@ -62,7 +62,7 @@ def state_graph(instance: Instance) -> StateGraph:
     root, end = m * m + n * (m + 1), m * m + n * (m + 1) + 1
     empty, alone, second = at_bin[bins, bins], at_object[:, m], at_object[:, :m]
     apart = bins[:, None] != bins
-    groups = [
+    groups: list[tuple[Any, Any, Any]] = [
         (empty, end, 0),
         (empty[:, None], alone, inst.from_bin),
         (alone, empty[home], inst.to_bin[objects, home]),
