@@ -26,6 +26,7 @@ from planner.exact.solver import ExactSolver
 from planner.exact.table import Solution
 from planner.plan import Certificate, Plan, Proof, Status
 from planner.problem import make_plan, tour_length
+from planner.problem_json import claim_from_json, claim_to_json
 from planner.solvers import NEVER, Deadline, SolveLimit, solver
 
 CUTS = ExactSolver(table_bytes=0, most_searched=0)
@@ -143,7 +144,9 @@ def test_the_root_bound_is_derived_to_the_unit(proven):
 
 def test_what_the_checker_does_not_repeat_is_named(proven):
     problem, plan = proven
-    found = verify_optimal(problem, plan)
+    read = claim_from_json(claim_to_json(problem, plan), problem)
+    assert read.certificate == plan.certificate
+    found = verify_optimal(problem, read)
     assert f"branch and bound ({plan.certificate.branched} nodes)" in found.why
     assert found.lower_bound < plan.lower_bound == plan.cost
     assert not found.optimal
