@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.cuts_checker import cuts_bound
 from planner.errors import ProblemError
 from planner.integer_distances import TOLERANCE
 from planner.plan import Certificate, Plan, Proof, Status, VisitKind
@@ -30,8 +31,8 @@ def check(problem: RoutingProblem, plan: Plan) -> float:
     """Check a plan and return a lower bound on tour lengths in metres (PAPER section 2, equation 1).
 
     With up to seven objects, every order of visits is tried. With more objects, the bound results from a
-    spanning tree, or from the certificate's table if this table has at most 2^16 rows. Otherwise, the bound
-    is 0. The search of the solver is not repeated, so the bound may be below `plan.lower_bound`.
+    spanning tree, from the certificate's cuts, or from its table if this table has at most 2^16 rows. Otherwise,
+    the bound is 0. The search of the solver is not repeated, so the bound may be below `plan.lower_bound`.
 
     Raises:
         ProblemError: A visit is impossible or repeated, an object is not delivered, the cost is wrong, the
@@ -57,14 +58,17 @@ def derive(problem: RoutingProblem, plan: Plan, max_rows: int) -> tuple[float, R
     relaxation = None
     if certificate.proof is Proof.SPANNING_TREE:
         derived = _spanning_tree(problem)
+    elif certificate.proof is Proof.CUTS:
+        derived = cuts_bound(problem, certificate)
     else:
         group, prices = _claim(problem, certificate)
         if problem.capacity > 2 or np.prod(np.bincount(group) + 1.0) > max_rows:
             return 0.0, None
         relaxation = Relaxation(problem, group, prices)
         derived = relaxation.root
-    _refuse(certificate.root * certificate.unit, derived, rounding, "certificate's root")
-    if certificate.proof is not Proof.RELAXATION:  # a search may have raised the relaxation's bound
+    if certificate.proof is not Proof.CUTS:  # the bound of cuts is compared in whole units
+        _refuse(certificate.root * certificate.unit, derived, rounding, "certificate's root")
+    if certificate.proof not in (Proof.RELAXATION, Proof.CUTS):  # a search may have raised these bounds
         _refuse(plan.lower_bound, derived, rounding, "lower bound")
     return derived, relaxation
 
@@ -216,6 +220,8 @@ def verify_optimal(problem: RoutingProblem, plan: Plan, *, max_states: int = MAX
         pass
     elif proof is Proof.SPANNING_TREE:
         why = "a spanning tree bounds the tour no better"
+    elif plan.certificate is not None and proof is Proof.CUTS:
+        why = f"branch and bound ({plan.certificate.branched} nodes) raised the bound of the cuts and is not repeated"
     elif proof in (Proof.FULL_TABLE, Proof.RELAXATION) and problem.capacity <= 2 and relaxation is None:
         why = f"the certificate's table has more than {VERIFY_ROWS} rows"
     elif (found := _shorter(problem, relaxation, wanted, max_states)) is None:

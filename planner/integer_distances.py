@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 TOLERANCE = 1e-9  # maximum relative error in the length of a tour that counts as optimal
 FINE = 1 << 44  # largest distance in the finest unit, so that a sum of 2^18 distances fits into int64
 TIE = 1e-10  # length difference that may be due to rounding, relative to the largest distance
-COARSE = 1 << 20  # largest distance in units for which tours of 40 objects fit into 32 bits
+COARSE = 1 << 20  # largest distance in units for which tours of 60 objects fit into 32 bits
 ROUND = 1e-15  # rounding error of decimal fractions in floats, relative to the largest distance
 
 

@@ -17,12 +17,15 @@ class Proof(enum.Enum):
     RELAXATION: The cost-to-go was computed for a relaxed problem, which counts objects by group and assigns a
         price to each pick. If the plan's bound is higher than that of the relaxation, a search has examined
         all states that could lead to a tour shorter than the plan's bound.
+    CUTS: The tour was relaxed to a flow in the graph of states, and connectivity cuts were added. If the plan's bound
+        is higher than that of the cuts, branch and bound in floating-point numbers has raised it.
     SPANNING_TREE: The bound is the length of the minimum spanning tree of all locations of the tour.
     """
 
     EXHAUSTIVE = "exhaustive"
     FULL_TABLE = "full-table"
     RELAXATION = "relaxation"
+    CUTS = "cuts"
     SPANNING_TREE = "spanning-tree"
 
 
@@ -33,11 +36,16 @@ class Certificate:
     proof: Proof
     unit: float  # length of one unit in metres
     # Lower bound in units before any search: the optimal length (full table, exhaustive), the bound of the
-    # relaxation, or the length of the spanning tree. A search may have raised the plan's lower bound further.
+    # relaxation or of the cuts, or the length of the spanning tree. A search may have raised the plan's bound further.
     root: int
     # Groups of shipments. The relaxation only counts the remaining shipments of each group.
     groups: tuple[tuple[int, ...], ...] = ()
-    multipliers: tuple[int, ...] = ()  # price for picking up each shipment, in units
+    multipliers: tuple[int, ...] = ()  # price for picking up each shipment, in units divided by `parts`
+    # Each cut is an object, a multiplier in units divided by `parts`, and a set of nodes of the graph of states, as
+    # numbered in `planner.cuts_checker`. The set is entered at least as often as the object is picked up in it.
+    cuts: tuple[tuple[int, int, tuple[int, ...]], ...] = ()
+    parts: int = 1
+    branched: int = 0  # number of nodes of branch and bound, which no checker repeats
 
 
 class Status(enum.Enum):

@@ -44,6 +44,9 @@ class _Certificate(Struct, forbid_unknown_fields=True):
     root: Whole
     groups: tuple[tuple[Whole, ...], ...]
     multipliers: tuple[Whole, ...]
+    cuts: tuple[tuple[Whole, Whole, tuple[Whole, ...]], ...] = ()
+    parts: Whole = 1
+    branched: Whole = 0
 
 
 class _Claim(Struct, forbid_unknown_fields=True):
@@ -98,6 +101,9 @@ def claim_to_json(problem: RoutingProblem, plan: Plan) -> str:
     fields = {name: getattr(plan, name) for name in ("cost", "lower_bound", "status", "certificate")}
     visits = [_action(problem, visit) for visit in plan.visits]
     written: Any = msgspec.to_builtins({"format": FORMAT, "visits": visits, **fields})
+    if plan.certificate is not None and plan.certificate.proof is not Proof.CUTS:
+        for name in ("cuts", "parts", "branched"):
+            del written["certificate"][name]
     return json.dumps(written)
 
 

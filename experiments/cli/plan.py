@@ -32,7 +32,7 @@ Indices refer to rows of the symmetric matrix distances, in metres or any other 
 each object that is carried at the start. The answer goes to standard output:
   {"visits": [1, 2, 2], "cost": 7.0, "lower_bound": 7.0, "status": "optimal", "seconds": 0.001}
 "optimal" means that no tour is shorter than cost by more than a billionth of it, whatever the scale of the distances.
-The exact planner proves tours for capacity 1 and 2, up to 40 objects and distances that satisfy the triangle
+The exact planner proves tours for capacity 1 and 2, up to 60 objects and distances that satisfy the triangle
 inequality. OR-Tools plans all other problems without a proof, and a line on standard error says so.
 
 Progress of a long search goes to standard error. Ctrl-C or SIGTERM ends the search with the best tour so far. Malformed

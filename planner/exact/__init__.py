@@ -3,7 +3,7 @@
 The entry point is `solver.ExactSolver`. The module `table` contains the equations, and the section "How the
 proof works" in docs/planners.md explains the method.
 
-    solver        the planner, which uses a full table, a search, or OR-Tools
+    solver        the planner, which uses a full table, a search, branch and cut, or OR-Tools
     full_table    a table over all subsets of the objects
     task_table    a full table that is reused for successive states of a task
     instance      a routing problem as integer arrays
@@ -13,6 +13,7 @@ proof works" in docs/planners.md explains the method.
       annealing       a first tour from simulated annealing
       multipliers     a lower bound from fitted Lagrangian multipliers
       expand, nodes   kernels that expand a layer of states and keep the best states
+    cuts          branch and cut, for more than 24 objects
     table_regret  costs of possible next visits
     warm_start    results of earlier plans that can be reused
 """

@@ -10,6 +10,7 @@ from planner.plan import Visit, VisitKind
 from planner.problem import RoutingProblem
 
 FAR = 1 << 59  # length greater than that of any tour
+MAX_SEARCHED = 40  # maximum number of objects for beam searches, whose keys contain a bit for each object
 
 
 class Instance(NamedTuple):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from planner.exact.annealing import anneal, anneal_from, tour_actions, warm_order
 from planner.exact.expand import PLACE_BITS, expand, offer_roots
-from planner.exact.instance import Instance
+from planner.exact.instance import MAX_SEARCHED, Instance
 from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown, warm_bound
 from planner.exact.nodes import FIRST_ROOM, NO_PARENT, keep_best, new_nodes
 from planner.exact.table import BIN_ROWS, INFINITE, Solution
@@ -68,7 +68,7 @@ def _first_tour(
         bound = warm_bound(instance, start, WARM_ROWS)
     upper, lower = int(length), bound.root
     actions: list[int] = tour_actions(instance, order).tolist()
-    if start is not None:
+    if start is not None and len(instance.home) <= MAX_SEARCHED:
         narrow = beam_pass(bound, upper, WARM_WIDTH, work, NEVER)
         lower = max(lower, narrow.lower)
         if narrow.actions is not None:

@@ -1,13 +1,14 @@
-"""The exact planner for a capacity of one or two and up to 40 objects. OR-Tools solves other problems."""
+"""The exact planner for a capacity of one or two and up to 60 objects. OR-Tools solves other problems."""
 
 import math
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
+from planner.exact.cuts.graph import LONGEST
 from planner.exact.full_table import SMALL_TABLE, by_table, full_table_bytes
-from planner.exact.instance import Instance, make_instance, to_visits
-from planner.exact.table import BIN_ROWS, Solution
+from planner.exact.instance import MAX_SEARCHED, Instance, make_instance, to_visits
+from planner.exact.table import BIN_ROWS, Solution, longest
 from planner.exact.warm_start import Start, WarmStart
 from planner.plan import Plan
 from planner.problem import RoutingProblem, make_plan
@@ -15,23 +16,27 @@ from planner.solvers import Deadline, SolveLimit
 
 TABLE_RATE = 500e6  # approximate speed at which a full table is filled, in bytes per second
 DEFAULT_WORK = 4_000_000  # default number of states to expand, which takes about 4 s including tables
-MAX_OBJECTS = 40
+MAX_OBJECTS = 60
+MAX_ARCS = 40_000  # approximate maximum number of arcs for branch and cut, which may take minutes and 1 GB
 
 
 @dataclass(frozen=True)
 class ExactSolver:
-    """A planner that finds optimal tours with a full table, or with annealing and a beam search.
+    """A planner that finds optimal tours with a full table, a beam search, or branch and cut, by number of objects.
 
-    `SolveLimit.work` is the maximum number of states that the search expands. It does not limit full tables.
+    `SolveLimit.work` is the maximum number of states that the search expands. It does not limit full tables. Branch and
+    cut counts each round and each node as the number of states that are expanded in the same time.
 
     Attributes:
         name: Name of the planner in run records.
         table_bytes: Maximum size of a full table in bytes. A value of 0 disables full tables.
+        most_searched: Number of objects above which branch and cut replaces the beam search.
         passes: Limits of each pass: number of rows in the bound's table, and number of states kept per layer.
     """
 
     name: str = "exact"
     table_bytes: int = 1 << 27  # enough for 18 objects and 6 bins, which takes 0.1 s
+    most_searched: int = 24
     passes: tuple[tuple[int, int], ...] = (
         (600, 1_500),
         (2_500, 8_000),
@@ -90,6 +95,8 @@ class ExactSolver:
             return f"the capacity of {problem.capacity} is above 2"
         if len(problem.shipments) > MAX_OBJECTS:
             return f"{len(problem.shipments)} shipments are more than {MAX_OBJECTS}"
+        if len(problem.shipments) > MAX_SEARCHED and not _few_arcs(problem):
+            return f"{len(problem.shipments)} shipments are more than {MAX_SEARCHED} and have too many bins"
         return "" if problem.integers.is_metric else "the distances break the triangle inequality"
 
     def table_fits(self, instance: Instance) -> bool:
@@ -133,7 +140,25 @@ class ExactSolver:
         from planner.exact.search import improving_tours  # imported here because it takes 0.5 s to import
 
         deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)
-        passes = () if tabled else self.passes
-        yield from improving_tours(instance, seed, limit.work or DEFAULT_WORK, deadline, passes, start)
+        work, cut = limit.work or DEFAULT_WORK, not tabled and self._cuts(instance)
+        passes = () if tabled or cut else self.passes
+        for solution in improving_tours(instance, seed, work, deadline, passes, start):
+            yield solution
         if tabled and not deadline.over():
             yield by_table(instance)
+        elif cut and not deadline.over():
+            # Imported here because it loads MathOpt.
+            from planner.exact.cuts.branch_and_cut import tours_by_cuts
+
+            yield from tours_by_cuts(instance, seed, work, deadline, solution)
+
+    def _cuts(self, instance: Instance) -> bool:
+        """Return True if branch and cut solves an instance. With up to 40 objects, it must be able to prove a tour."""
+        n, m = instance.to_bin.shape
+        exact = instance.tie == 0 and longest(instance) <= LONGEST
+        return n > MAX_SEARCHED or (n > self.most_searched and exact and n * m * m <= MAX_ARCS)
+
+
+def _few_arcs(problem: RoutingProblem) -> bool:
+    bins = {s.delivery for s in problem.shipments} | set(problem.onboard)
+    return len(problem.shipments) * len(bins) ** 2 <= MAX_ARCS

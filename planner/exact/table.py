@@ -34,7 +34,7 @@ from planner.plan import Certificate
 
 BIN_ROWS = 50_000  # row limit of a table with one group per bin, enough for 30 objects and 6 bins
 SPARE = 8  # number of unused entries after the last row, because kernels read eight at a time
-# Maximum leg and price for which tours of 40 objects fit into int32, and maximum price for int64, in units
+# Maximum leg and price for which tours of 60 objects fit into int32, and maximum price for int64, in units
 LONGEST_32, DEAREST_32, DEAREST_64 = 1 << 21, 1 << 23, 1 << 53
 INFINITE = 1 << 60  # length greater than any sum of legs
 
@@ -80,7 +80,7 @@ def new_table(inst: Instance, group: NDArray[np.int64]) -> CostTable:
     size = np.bincount(group).astype(np.int64)
     below = np.ones(len(size) + 1, np.int64)
     below[1:] = np.cumprod(size + 1)
-    rows, width, narrow = int(below[-1]), 2 * m * m + n, _longest(inst) <= LONGEST_32
+    rows, width, narrow = int(below[-1]), 2 * m * m + n, longest(inst) <= LONGEST_32
     entries = np.empty(rows * width + SPARE, np.int32 if narrow else np.int64)
     table = entries[: rows * width].reshape(rows, width)
     return CostTable(
@@ -95,9 +95,10 @@ def new_table(inst: Instance, group: NDArray[np.int64]) -> CostTable:
     )
 
 
-def _longest(inst: Instance) -> int:
-    longest = max(legs.max(initial=0) for legs in (inst.to_bin, inst.from_bin, inst.bins))
-    return int(np.where(inst.between < FAR, inst.between, 0).max(initial=longest))
+def longest(inst: Instance) -> int:
+    """Return the length of the longest leg that does not begin at the root."""
+    leg = max(legs.max(initial=0) for legs in (inst.to_bin, inst.from_bin, inst.bins))
+    return int(np.where(inst.between < FAR, inst.between, 0).max(initial=leg))
 
 
 def fill_layers(inst: Instance, table: CostTable) -> None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
 from planner.exact.expand import PLACE_BITS, expand, offer_roots
-from planner.exact.instance import Instance
+from planner.exact.instance import MAX_SEARCHED, Instance
 from planner.exact.multipliers import Bound
 from planner.exact.nodes import FIRST_ROOM, Nodes, new_nodes, slot_of
 from planner.exact.table import INFINITE, CostTable
@@ -52,10 +52,12 @@ def costs_by_pass(
 
     The search visits every state on a tour of at most this length. A backward sweep then computes the
     shortest remaining tour from each state. `visits` lists the possible next visits, places first. The
-    result is None if there are more than `max_states` states or the deadline has passed.
+    result is None if there are too many objects, more than `max_states` states, or the deadline has passed.
     """
     instance, table = bound.instance, bound.table
     n = len(instance.home)
+    if n > MAX_SEARCHED:
+        return None
     limit = longest + 1 + bound.prices
     layers: list[Nodes] = []
     here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)

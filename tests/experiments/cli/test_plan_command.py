@@ -85,10 +85,10 @@ def test_a_signal_ends_planning_with_the_best_tour_so_far(number):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("change", "reason"), [({"capacity": 3}, "capacity of 3"), ({}, "more than 40"), (None, "triangle")]
+    ("change", "reason"), [({"capacity": 3}, "capacity of 3"), ({}, "more than 60"), (None, "triangle")]
 )
 def test_a_plan_of_or_tools_says_that_it_is_not_proven(tmp_path, capsys, change, reason):
-    problem = scattered(41 if change == {} else 5) | (change or {})
+    problem = scattered(61 if change == {} else 5) | (change or {})
     if change is None:
         problem["distances"][1][9] = problem["distances"][9][1] = 100.0
     code, printed = plan(tmp_path, capsys, problem, "--time-limit", "1")

@@ -173,7 +173,7 @@ def test_distances_that_are_no_metric_are_taken_as_given():
     assert (plan.status, plan.cost) == (Status.OPTIMAL, 51.0)
 
 
-@pytest.mark.parametrize(("n", "capacity"), [(16, 3), (16, 4), (41, 2)])
+@pytest.mark.parametrize(("n", "capacity"), [(16, 3), (16, 4), (61, 2)])
 def test_beyond_its_limits_it_has_a_tour_and_no_worse_a_bound_than_or_tools(n, capacity):
     problem = dataclasses.replace(random_problem(5, n), capacity=capacity)
     limit = SolveLimit(seconds=0.4)

@@ -4,78 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planning_cases import expected, grid_problem
 
-from mjsim.support.kernels import kernel
 from planner.checker import check
 from planner.exact.solver import ExactSolver
 from planner.plan import Status
 from planner.problem import RoutingProblem, Shipment, tour_length
 
 TABLE, SEARCH = ExactSolver(), ExactSolver(table_bytes=0)
-FAR = 1 << 60
-
-
-@kernel
-def oracle(d, start, pickup, delivery, onboard, capacity):
-    """Return the minimum tour length by dynamic programming over the states of all objects.
-
-    An object is loose (0), carried (1) or delivered (2). The row of the table is a number in base 3 whose
-    digit k is the state of object k, with carried objects last. The column is the current location.
-    """
-    n, k = pickup.size, pickup.size + onboard.size
-    codes = 3**k
-    cost = np.full((codes, len(d)), FAR, np.int64)
-    code = 0
-    for i in range(n, k):
-        code += 3**i
-    cost[code, start] = 0
-    best = FAR
-    for code in range(codes):  # every visit leads to a larger code
-        carried, done = 0, 0
-        for i in range(k):
-            carried += code // 3**i % 3 == 1
-            done += code // 3**i % 3 == 2
-        for here in range(len(d)):
-            so_far = cost[code, here]
-            if so_far == FAR:
-                continue
-            if done == k:
-                best = min(best, so_far)
-            for i in range(k):
-                state = code // 3**i % 3
-                if state == 2 or (state == 0 and carried == capacity):
-                    continue
-                goal = delivery[i] if i < n else onboard[i - n]
-                there = pickup[i] if state == 0 else goal
-                after = code + 3**i
-                cost[after, there] = min(cost[after, there], so_far + d[here, there])
-    return best
-
-
-def expected(problem):
-    return int(
-        oracle(
-            problem.integers.metric,
-            problem.start,
-            np.array([s.pickup for s in problem.shipments], np.int64),
-            np.array([s.delivery for s in problem.shipments], np.int64),
-            np.array(problem.onboard, np.int64),
-            problem.capacity,
-        )
-    )
-
-
-def grid_problem(rng, most, capacity):
-    """Return a problem on a coarse grid with Manhattan or Euclidean distances. Places may coincide."""
-    n, side = int(rng.integers(0, most + 1)), int(rng.integers(1, 6))
-    places = int(rng.integers(2, 3 + n + 4))
-    points = rng.integers(0, side, (places, 2)).astype(float)
-    apart = np.abs(points[:, None] - points[None])
-    d = apart.sum(axis=2) if rng.random() < 0.5 else np.hypot(apart[..., 0], apart[..., 1])
-    bins = rng.integers(0, places, int(rng.integers(1, n + 2)))  # often a different bin for every object
-    shipments = tuple(Shipment(int(rng.integers(places)), int(rng.choice(bins))) for _ in range(n))
-    onboard = tuple(int(j) for j in rng.choice(bins, int(rng.integers(0, capacity + 1))))
-    return RoutingProblem(d, int(rng.integers(places)), shipments, onboard, capacity)
 
 
 def assert_optimal(problem, planner, length):
