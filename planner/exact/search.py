@@ -34,8 +34,8 @@ def improving_tours(
 
     `work` is the maximum number of states to expand. No pass begins after the deadline.
     """
-    bound, upper, lower, actions = _first_tour(instance, seed, work, start)
-    yield Solution(actions, min(lower, upper), _certificate(bound))
+    bound, upper, lower, actions, expanded = _first_tour(instance, seed, work, start)
+    yield Solution(actions, min(lower, upper), _certificate(bound), expanded)
     done, rate, by_bin = 0, max(1, len(instance.home) // 2), False
     for rows, wanted in passes:
         # An unfinished pass proves nothing, so choose a width that the remaining work allows.
@@ -47,17 +47,18 @@ def improving_tours(
         bound = grown(bound, upper, rows, deadline)
         result = beam_pass(bound, upper, width, work, deadline)
         work -= result.expanded
+        expanded += result.expanded
         # A wider pass expands fewer states per unit of width.
         done, rate = width, max(1, -(-result.expanded // width))
         lower = max(lower, bound.root, result.lower)
         if result.actions is not None:
             upper, actions = result.upper, result.actions
-        yield Solution(actions, min(lower, upper), _certificate(bound))
+        yield Solution(actions, min(lower, upper), _certificate(bound), expanded)
 
 
 def _first_tour(
     instance: Instance, seed: int, work: int, start: Start | None
-) -> tuple[Bound, int, int, list[int]]:
+) -> tuple[Bound, int, int, list[int], int]:
     if start is None:
         length, order = anneal(instance, seed, ANNEALING_MOVES)
         bound = first_bound(instance, int(length))
@@ -66,14 +67,14 @@ def _first_tour(
             instance, seed, WARM_MOVES, warm_order(instance, start), *WARM_TEMPERATURES
         )
         bound = warm_bound(instance, start, WARM_ROWS)
-    upper, lower = int(length), bound.root
+    upper, lower, expanded = int(length), bound.root, 0
     actions: list[int] = tour_actions(instance, order).tolist()
-    if start is not None:
+    if start is not None and work > 0:
         narrow = beam_pass(bound, upper, WARM_WIDTH, work, NEVER)
-        lower = max(lower, narrow.lower)
+        lower, expanded = max(lower, narrow.lower), narrow.expanded
         if narrow.actions is not None:
             upper, actions = narrow.upper, narrow.actions
-    return bound, upper, lower, actions
+    return bound, upper, lower, actions, expanded
 
 
 def _certificate(bound: Bound) -> Certificate:
