@@ -18,7 +18,7 @@ from planner.solvers import SolveLimit
 T = TypeVar("T")
 REGRET_SECONDS = 5.0  # time limit for the regrets of one state in live mode, in seconds
 # How long the end of a live task waits for the regrets of its visits, and then for their bounds, in seconds
-FINISH_SECONDS, BOUNDS_SECONDS = 1.0, 0.5
+FINISH_SECONDS, BOUNDS_SECONDS = 0.6, 0.9
 
 
 class Mode(enum.Enum):
@@ -217,7 +217,7 @@ class Planner:
     def finish(self) -> list[tuple[Any, RegretBounds | None]]:
         """End the task, and return the label and the regret of each visit that `judge` has postponed.
 
-        After a second, regrets that are not proven yet are only bounded. Raises PlannerError if planning failed.
+        After 0.6 s, regrets that are not proven yet are only bounded. Raises PlannerError if planning failed.
         """
         self.settle()
         _ = self.route

@@ -81,9 +81,8 @@ class SolverSource(PlanSource):
     ) -> None:
         self.problems = TaskProblems(geodesics, capacity)
         self._solver, self._seed, self._limit = solver, seed, limit
-        exact = solver if isinstance(solver, ExactSolver) else None
-        self._table = exact and TaskTable(exact)
-        self._unseen = exact and TaskSearch(exact, limit)
+        self._table = TaskTable(solver) if isinstance(solver, ExactSolver) else None
+        self._unseen = TaskSearch(solver, limit) if isinstance(solver, ExactSolver) else None
         self._warm = NOTHING_KNOWN
         self._planned: dict[str, XY] = {}  # positions of the loose objects when the plan was made
         self._search: _BackgroundSearch | None = None

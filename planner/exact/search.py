@@ -29,12 +29,14 @@ def improving_tours(
     deadline: Deadline,
     passes: tuple[tuple[int, int], ...],
     start: Start | None,
+    warm_rows: int = WARM_ROWS,
 ) -> Iterator[Solution]:
     """Yield a first tour with a lower bound, then the best tour and bound after each pass of the search.
 
-    `work` is the maximum number of states to expand. No pass begins after the deadline.
+    `work` is the maximum number of states to expand. `warm_rows` is the maximum number of rows in the table of
+    a warm start. No pass begins after the deadline.
     """
-    bound, upper, lower, actions, expanded = _first_tour(instance, seed, work, start)
+    bound, upper, lower, actions, expanded = _first_tour(instance, seed, work, start, warm_rows)
     yield Solution(actions, min(lower, upper), _certificate(bound), expanded)
     done, rate, by_bin = 0, max(1, len(instance.home) // 2), False
     for rows, wanted in passes:
@@ -57,7 +59,7 @@ def improving_tours(
 
 
 def _first_tour(
-    instance: Instance, seed: int, work: int, start: Start | None
+    instance: Instance, seed: int, work: int, start: Start | None, warm_rows: int
 ) -> tuple[Bound, int, int, list[int], int]:
     if start is None:
         length, order = anneal(instance, seed, ANNEALING_MOVES)
@@ -66,7 +68,7 @@ def _first_tour(
         length, order = anneal_from(
             instance, seed, WARM_MOVES, warm_order(instance, start), *WARM_TEMPERATURES
         )
-        bound = warm_bound(instance, start, WARM_ROWS)
+        bound = warm_bound(instance, start, warm_rows)
     upper, lower, expanded = int(length), bound.root, 0
     actions: list[int] = tour_actions(instance, order).tolist()
     if start is not None and work > 0:

@@ -14,6 +14,7 @@ from planner.solvers import Deadline, SolveLimit
 TASK_WORK = 3_000_000  # default number of states that all searches of a task expand together
 TABLE_OBJECTS = 18  # number of objects from which on a full table replaces the searches
 PAUSE = 2  # number of objects that must be picked up before the next search after one without a proof
+HURRIED_ROWS = 600  # maximum number of rows in a table that is filled after the search was stopped
 SEARCHES = 2  # number of searches for each object that is picked up: after its pick and after its place
 
 
@@ -64,13 +65,17 @@ class TaskSearch:
 
     def plan(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
         """Return the best plan within the share of this problem, to which the solver must apply."""
-        from planner.exact.search import improving_tours  # imported here because it takes 0.5 s to import
+        from planner.exact.search import (
+            WARM_ROWS,
+            improving_tours,
+        )  # imported here because it takes 0.5 s to import
 
         started, metric = time.perf_counter(), problem.integers.metric
         instance, n = make_instance(problem, metric), len(problem.shipments)
-        work = 0 if limit is not None and limit.stopped else self.share(problem)
+        stopped = limit is not None and limit.stopped
+        work, rows = (0, HURRIED_ROWS) if stopped else (self.share(problem), WARM_ROWS)
         start = self.start(problem, instance)
-        *_, best = improving_tours(instance, seed, work, deadline(limit), self._solver.passes, start)
+        *_, best = improving_tours(instance, seed, work, deadline(limit), self._solver.passes, start, rows)
         self.spend(best.expanded)
         visits = to_visits(instance, best.actions, problem.names[:n], problem.names[n:])
         plan = make_plan(problem, metric, visits, best.bound, started, best.certificate)
