@@ -1,27 +1,27 @@
 """Compute the regrets of visits, which are the extra tour lengths compared with the best next visit."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from planner.errors import ProblemError
 from planner.exact.instance import make_instance
-from planner.exact.multipliers import first_bound, grown, warm_bound
+from planner.exact.multipliers import Bound, first_bound, grown, warm_bound
 from planner.exact.solver import ExactSolver
 from planner.exact.table_regret import Costs, costs_by_pass, costs_in
+from planner.exact.task_search import TaskSearch, deadline
 from planner.exact.task_table import TaskTable
-from planner.exact.warm_start import NOTHING_KNOWN
 from planner.geodesics import Geodesics
-from planner.plan import Plan, Status, Visit, VisitKind
+from planner.plan import Plan, Status, Visit
 from planner.problem import RoutingProblem, possible_next, tour_length
 from planner.route import TaskState
-from planner.solvers import Deadline, SolveLimit, Solver
+from planner.solvers import SolveLimit, Solver
 from planner.task_problems import TaskProblems
+from planner.tour_bounds import TourBounds, after, is_for
 
 RADIUS = 1.0  # default limit up to which regrets are computed exactly, in metres
 MIN_RADIUS = 0.1  # smallest radius of a pass in metres
 MAX_ROWS = 1 << 14  # maximum number of rows in the lower-bound table of a pass
 MAX_STATES = 3_000_000  # maximum number of states in a pass, which occupy about 200 MB
-SAME = 1e-6  # difference up to which two tour lengths count as equal, in metres
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,21 @@ class Regret:
     capped: bool = False  # True if cost and regret are only lower bounds
 
 
+@dataclass(frozen=True)
+class RegretBounds:
+    """Proven bounds on the regret of a visit in metres."""
+
+    lower: float
+    upper: float
+    exact: float | None  # the regret, or None if it is not proven
+
+
 class RegretEvaluator:
     """An evaluator that computes the regrets of visits with the exact planner.
 
-    `limit` applies to searches with more than 18 remaining objects. By default, the solver's limit applies.
-    Results are reproducible unless time is limited. `all` computes regrets of up to `radius` metres exactly.
+    `limit` applies to searches with more than 18 remaining objects. All of them together expand at most
+    `limit.work` states, or 3 million by default. Results are reproducible unless time is limited. `all`
+    computes regrets of up to `radius` metres exactly.
     """
 
     def __init__(
@@ -50,18 +60,33 @@ class RegretEvaluator:
         capacity: int = 2,
         limit: SolveLimit | None = None,
         radius: float = RADIUS,
+        search: TaskSearch | None = None,
     ) -> None:
         self._geodesics, self._capacity = geodesics, capacity
         self._solver = solver or ExactSolver()
         self._problems = TaskProblems(geodesics, capacity)
         self._table = TaskTable(self._solver)
         self._limit, self._radius = limit, radius
+        self._search = search or TaskSearch(self._solver, limit)
+        self._tours = TourBounds(self._solver, self._search, self._problems.walk)
         self._last: tuple[TaskState, dict[Visit, Regret]] | None = None
 
-    def limited(self, limit: SolveLimit) -> "RegretEvaluator":
-        """Return a copy of this evaluator with a limit on each search, for use in another thread."""
+    def copy(self) -> "RegretEvaluator":
+        """Return a copy of this evaluator with the same limit, but with a budget of its own."""
+        return self.limited(self._limit, TaskSearch(self._solver, self._limit))
+
+    def limited(self, limit: SolveLimit | None, search: TaskSearch | None = None) -> "RegretEvaluator":
+        """Return a copy of this evaluator with a limit on each search, for use in another thread.
+
+        The copies share the budget of states, unless they receive a `search` of their own.
+        """
         return RegretEvaluator(
-            self._geodesics, solver=self._solver, capacity=self._capacity, limit=limit, radius=self._radius
+            self._geodesics,
+            solver=self._solver,
+            capacity=self._capacity,
+            limit=limit,
+            radius=self._radius,
+            search=search or self._search,
         )
 
     def all(self, state: TaskState, plan: Plan | None = None) -> dict[Visit, Regret]:
@@ -75,9 +100,11 @@ class RegretEvaluator:
             costs = self._table.costs(problem)
             if costs is not None:
                 found = _ranked(problem, *costs)
+            elif self._solver.applies(problem):
+                best = plan if plan is not None and is_for(plan, problem) else None
+                found = _around_best(problem, self._search, self._limit, self._radius, best)
             else:
-                best = plan if plan is not None and _is_best(plan, problem) else None
-                found = _beyond_table(problem, self._solver, self._limit, self._radius, best)
+                found = one_by_one(problem, self._solver, limit=self._limit)
             self._last = state, {regret.visit: regret for regret in found}
         return dict(self._last[1])
 
@@ -87,24 +114,39 @@ class RegretEvaluator:
         `plan` is a plan for this state or an earlier one, or None. Raises UnreachableError if objects cannot be fetched
         or delivered.
         """
+        bounds = self.bounds(state, visit, plan)
+        return None if bounds is None else bounds.exact
+
+    def bounds(self, state: TaskState, visit: Visit, plan: Plan | None = None) -> RegretBounds | None:
+        """Return bounds on the regret of a visit, or None if the visit is not possible.
+
+        The arguments and errors are those of `of`. What a call finds out is kept for the state after the visit.
+        """
         if self._last is not None and same_state(self._last[0], state):
             known = self._last[1].get(visit)
             if known is not None and known.proven and not known.capped:
-                return known.regret
+                return RegretBounds(known.regret, known.regret, known.regret)
         problem = self._problems.problem(state)
         if visit not in possible_next(problem):
             return None
         costs = self._table.costs(problem)
         if costs is not None:
-            return next(regret.regret for regret in _ranked(problem, *costs) if regret.visit == visit)
-        before = plan if plan is not None and _is_best(plan, problem) else None
-        before = before or self._solver.solve(problem, limit=self._limit)
-        warm = NOTHING_KNOWN.updated(problem, before)  # a warm start halves the time
-        *_, rest = self._solver.improve(after(problem, visit), limit=self._limit, warm=warm)
-        if not before.status is rest.status is Status.OPTIMAL:
-            return None
+            exact = next(regret.regret for regret in _ranked(problem, *costs) if regret.visit == visit)
+            return RegretBounds(exact, exact, exact)
+        before = self._tours.before(state, problem, plan, self._limit)
+        rest = self._tours.after(state, problem, before, visit, self._limit)
         leg = float(problem.distances[problem.start, problem.location(visit)])
-        return max(0.0, leg + rest.cost - before.cost)
+        exact = max(0.0, leg + rest.cost - before.cost)
+        if before.status is rest.status is Status.OPTIMAL:
+            return RegretBounds(exact, exact, exact)
+        lower = max(0.0, leg + rest.lower_bound - min(before.cost, leg + rest.cost))
+        return RegretBounds(lower, max(lower, leg + rest.cost - before.lower_bound), None)
+
+    def follow(self, state: TaskState, visit: Visit, plan: Plan) -> None:
+        """Keep the rest of a proven plan for the state after a visit that the plan suggested."""
+        problem = self._problems.problem(state)
+        if self._solver.applies(problem) and not self._table.fits(problem):
+            self._tours.follow(state, problem, visit, plan)
 
 
 def same_state(one: TaskState, other: TaskState) -> bool:
@@ -113,24 +155,6 @@ def same_state(one: TaskState, other: TaskState) -> bool:
         other.position,
         other.carried,
         other.loose,
-    )
-
-
-def after(problem: RoutingProblem, visit: Visit) -> RoutingProblem:
-    """Return the problem that remains after a visit. Raises ProblemError if the visit is not possible."""
-    if visit not in possible_next(problem):
-        raise ProblemError(f"{visit} is not possible now; choose one of possible_next")
-    shipments, onboard = list(problem.shipments), list(problem.onboard)
-    names, number = list(problem.names), problem.number[visit.object]
-    name = names.pop(number)
-    if visit.kind is VisitKind.PICK:
-        onboard.append(shipments.pop(number).delivery)
-        names.append(name)
-    else:
-        onboard.pop(number - len(shipments))
-    start = problem.location(visit)
-    return replace(
-        problem, start=start, shipments=tuple(shipments), onboard=tuple(onboard), names=tuple(names)
     )
 
 
@@ -146,16 +170,17 @@ def regrets(
 
     The exact planner evaluates all visits at once. It uses the full table for up to 18 objects, and otherwise
     one pass over all tours that are at most `radius` longer than the best tour. Regrets above the radius are
-    lower bounds, marked as `capped`. If the pass is too large, the radius is halved, down to 0.1 m. The
-    remaining task is solved separately after each visit if the pass is still too large, if the best tour is
-    not proven optimal, or if the planner or the capacity does not allow a pass.
+    lower bounds, marked as `capped`. If the pass is too large, the radius is halved, down to 0.1 m. If the
+    pass is still too large or the best tour is not proven optimal, the regrets are estimated with the lower
+    bounds, and are not `proven`. With other planners or capacities, the remaining task is solved separately
+    after each visit.
 
     Args:
         problem: Routing problem of the remaining task.
         solver: Planner. With the exact one, regrets that are `proven` and not `capped` are exact.
-        limit: Limit for each problem that the planner solves.
+        limit: Limit for the search of the exact planner, or for each problem that another planner solves.
         radius: Largest regret that is computed exactly, in metres.
-        plan: Plan for this problem, or None. If the plan is proven optimal, the search for one is skipped.
+        plan: Plan for this problem, or None to search for one.
 
     Raises:
         ProblemError: The radius is negative.
@@ -165,7 +190,9 @@ def regrets(
     costs = TaskTable(solver).costs(problem) if isinstance(solver, ExactSolver) else None
     if costs is not None:
         return _ranked(problem, *costs)
-    return _beyond_table(problem, solver, limit, radius, plan)
+    if isinstance(solver, ExactSolver) and solver.applies(problem):
+        return _around_best(problem, TaskSearch(solver, limit), limit, radius, plan)
+    return one_by_one(problem, solver, limit=limit)
 
 
 def one_by_one(
@@ -201,50 +228,49 @@ def _ranked(
     )
 
 
-def _beyond_table(
-    problem: RoutingProblem, solver: Solver, limit: SolveLimit | None, radius: float, plan: Plan | None
-) -> tuple[Regret, ...]:
-    found = None
-    if isinstance(solver, ExactSolver) and solver.applies(problem):
-        found = _around_best(problem, solver, limit, radius, plan)
-    return found if found is not None else one_by_one(problem, solver, limit=limit)
-
-
 def _around_best(
-    problem: RoutingProblem, solver: ExactSolver, limit: SolveLimit | None, radius: float, plan: Plan | None
-) -> tuple[Regret, ...] | None:
+    problem: RoutingProblem, search: TaskSearch, limit: SolveLimit | None, radius: float, plan: Plan | None
+) -> tuple[Regret, ...]:
     """Compute all regrets in one pass over the tours that are at most `radius` longer than a proven plan.
 
-    Return None if the pass is too large or there is no proven plan.
+    If the pass is too large or there is no proven plan, the regrets are estimates.
     """
+    if plan is None:
+        plan = search.plan(problem, limit=limit)
+    else:
+        search.learn(problem, plan)
     metric, unit = problem.integers.metric, problem.integers.unit
-    if plan is None or plan.status is not Status.OPTIMAL:
-        plan = solver.solve(problem, limit=limit)
-    if plan.status is not Status.OPTIMAL:
-        return None
     best = int(tour_length(problem, plan.visits, metric))
-    deadline = Deadline(None, limit.stop if limit else None)
+    is_searched, end = plan.status is Status.OPTIMAL and search.share(problem) > 0, deadline(limit)
     instance, n = make_instance(problem, metric), len(problem.shipments)
-    start = NOTHING_KNOWN.updated(problem, plan).numbered(problem.names[:n], instance.unit)
+    start = search.start(problem, instance)
     bound = first_bound(instance, best) if start is None else warm_bound(instance, start, MAX_ROWS)
-    bound = grown(bound, best, MAX_ROWS, deadline)
-    table = bound.table
-    relaxed = costs_in(bound.instance, table, len(table.bin) - 1, problem.names[:n], problem.names[n:])
-    least = {visit: cost - bound.prices for visit, cost in relaxed.items()}
+    if is_searched:
+        bound = grown(bound, best, MAX_ROWS, end)
+    least = _least(bound, problem)
     dearest = (2 * n + len(problem.onboard)) * int(metric.max())  # upper bound on tour lengths
-    while True:
+    while is_searched:
         longest = best + math.floor(min(radius / unit, dearest))
-        costs = costs_by_pass(bound, list(possible_next(problem)), longest, MAX_STATES, deadline)
+        most = min(MAX_STATES, search.share(problem))
+        costs, states = costs_by_pass(bound, list(possible_next(problem)), longest, most, end)
+        search.spend(states)
         if costs is not None:
             return _ranked(problem, costs, unit, longest, least)
         radius /= 2
-        if radius < MIN_RADIUS or deadline.over():
-            return None
+        is_searched = radius >= MIN_RADIUS and not end.over()
+    return _estimated(plan, least, unit)
 
 
-def _is_best(plan: Plan, problem: RoutingProblem) -> bool:
-    visits = {problem.place(k) for k in range(len(problem.names))}
-    visits |= {problem.pick(k) for k in range(len(problem.shipments))}
-    if plan.status is not Status.OPTIMAL or set(plan.visits) != visits:
-        return False
-    return abs(tour_length(problem, plan.visits) - plan.cost) <= SAME
+def _least(bound: Bound, problem: RoutingProblem) -> Costs:
+    """Return a lower bound on the cost of each possible next visit, in units."""
+    n, table = len(problem.shipments), bound.table
+    relaxed = costs_in(bound.instance, table, len(table.bin) - 1, problem.names[:n], problem.names[n:])
+    return {visit: cost - bound.prices for visit, cost in relaxed.items()}
+
+
+def _estimated(plan: Plan, least: Costs, unit: float) -> tuple[Regret, ...]:
+    """Estimate regrets by the differences between lower bounds. The first visit of the plan is the best one."""
+    first = plan.visits[0]
+    extra = {visit: max(0.0, (cost - least[first]) * unit) for visit, cost in least.items()}
+    ordered = sorted(extra, key=lambda visit: (extra[visit], visit != first))
+    return tuple(Regret(visit, plan.cost + extra[visit], extra[visit], proven=False) for visit in ordered)

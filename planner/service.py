@@ -11,12 +11,14 @@ from typing import Any, TypeVar
 
 from planner.errors import PlannerError
 from planner.plan import Plan, Visit
-from planner.regret import Regret, RegretEvaluator, same_state
+from planner.regret import Regret, RegretBounds, RegretEvaluator, same_state
 from planner.route import PlanSource, Route, TaskState
 from planner.solvers import SolveLimit
 
 T = TypeVar("T")
 REGRET_SECONDS = 5.0  # time limit for the regrets of one state in live mode, in seconds
+# How long the end of a live task waits for the regrets of its visits, and then for their bounds, in seconds
+FINISH_SECONDS, BOUNDS_SECONDS = 0.6, 0.9
 
 
 class Mode(enum.Enum):
@@ -57,8 +59,16 @@ class Planner:
         self._latest: Future[None] | None = None  # most recent job of the background thread
         self._regrets: Future[Mapping[Visit, Regret]] | None = None  # regrets of the last state, in live mode
         self._stop = threading.Event()  # set to stop the computation of regrets
-        # label, state, visit and plan for each regret that is computed after the task
-        self._late: list[tuple[Any, TaskState, Visit, Plan]] = []
+        self._over = threading.Event()  # set to stop the computation of the regrets of completed visits
+        live = mode is Mode.LIVE
+        self._judges = (
+            ThreadPoolExecutor(1, "regrets") if live else None
+        )  # one thread, in the order of visits
+        # Evaluators for completed visits, and for regrets that are shown. They share neither tables nor, except
+        # in live mode, budgets, so logged regrets do not depend on which pictures are drawn.
+        self._judge = evaluator.limited(SolveLimit(stop=self._over)) if live else evaluator
+        self._display = evaluator if live else evaluator.copy()
+        self._late: list[tuple[Any, Future[RegretBounds | None]]] = []  # label and regret of completed visits
         self.use(source)
 
     def use(self, source: PlanSource) -> None:
@@ -85,8 +95,9 @@ class Planner:
     def prepare(self, state: TaskState, *, seconds: float | None = None) -> None:
         """Plan the route for the initial state before the task starts.
 
-        In live mode, wait up to `seconds` for a proof of optimality, then compute regrets once so that their
-        kernels are loaded. Raises UnreachableError or ProblemError if the task is impossible.
+        In live mode, wait up to `seconds` for a proof of optimality, then as long for the regrets, so that their
+        kernels are loaded. Both continue in the background. Raises UnreachableError or ProblemError if the task
+        is impossible.
         """
         self._prepared = state
         self.do(lambda _: self._set_task(state, self._plan(state, shown=False).plan))
@@ -94,7 +105,7 @@ class Planner:
             self.wait(seconds)
             self.improve(state)
             self.regrets()
-            self.wait(None)
+            futures.wait([self._regrets] if self._regrets is not None else [], seconds)
 
     def ask(
         self,
@@ -162,12 +173,15 @@ class Planner:
         self._route = better or self._route
         return better
 
-    def regrets(self) -> Mapping[Visit, Regret]:
-        """Return the regrets of possible next visits, smallest first. They may be missing in live mode."""
+    def regrets(self, *, shown: bool = False) -> Mapping[Visit, Regret]:
+        """Return the regrets of possible next visits, smallest first. They may be missing in live mode.
+
+        `shown` is True for regrets that are only displayed. They have a budget of their own.
+        """
         if self.route is None or self._task is None:
             return {}
         if self.mode is not Mode.LIVE:
-            return self._evaluator.all(*self._task)
+            return (self._display if shown else self._evaluator).all(*self._task)
         if self._regrets is None:
             self._stop = threading.Event()
             self._regrets = self._start(functools.partial(self._find_regrets, *self._task, self._stop))
@@ -177,27 +191,42 @@ class Planner:
         """Return the exact regret of a visit in metres, or None if no exact regret is available."""
         return None if self._task is None else self._evaluator.of(self._task[0], visit, self._task[1])
 
-    def judge(self, visit: Visit, label: Any) -> float | None:
-        """Return the regret of a completed visit in metres.
+    def judge(self, visit: Visit, label: Any) -> RegretBounds | None:
+        """Return the regret of a completed visit, or bounds on it.
 
-        In live mode, the result is None, and `finish` later returns the regret together with `label`.
+        In live mode, the result is None. A thread computes the regret, and `finish` returns it together with `label`.
         """
-        if self.mode is not Mode.LIVE:
-            return self.regret(visit)
-        if self._task is not None:
-            self._late.append((label, self._task[0], visit, self._task[1]))
+        if self._task is None:
+            return None
+        state, plan = self._task
+        if self._judges is None:
+            return self._judge.bounds(state, visit, plan)
+        self._late.append((label, self._judges.submit(self._judge.bounds, state, visit, plan)))
         return None
 
-    def finish(self) -> list[tuple[Any, float | None]]:
+    def follow(self, visit: Visit) -> None:
+        """Record a completed visit that a proven plan suggested, so that the rest of the plan is kept as proven."""
+        if self._task is None:
+            return
+        state, plan = self._task
+        if self._judges is None:
+            self._judge.follow(state, visit, plan)
+        else:
+            self._judges.submit(self._judge.follow, state, visit, plan)
+
+    def finish(self) -> list[tuple[Any, RegretBounds | None]]:
         """End the task, and return the label and the regret of each visit that `judge` has postponed.
 
-        Raises PlannerError if planning failed.
+        After 0.6 s, regrets that are not proven yet are only bounded. Raises PlannerError if planning failed.
         """
         self.settle()
         _ = self.route
         self._forget_regrets()
         late, self._late = self._late, []
-        return [(label, self._evaluator.of(state, visit, plan)) for label, state, visit, plan in late]
+        futures.wait([found for _, found in late], FINISH_SECONDS)
+        self._over.set()
+        futures.wait([found for _, found in late], BOUNDS_SECONDS)
+        return [(label, found.result() if found.done() else None) for label, found in late]
 
     def settle(self) -> None:
         """Wait for all results and switch from thread mode to inline mode. Other modes do not change."""
@@ -214,6 +243,9 @@ class Planner:
         self.settle()
         self._source.close()
         self._forget_regrets()
+        self._over.set()
+        if self._judges is not None:
+            self._judges.shutdown(cancel_futures=True)
         if self._executor is not None:
             self._executor.shutdown()
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from planner.exact.solver import ExactSolver
+from planner.exact.task_search import TaskSearch
 from planner.exact.task_table import TaskTable
 from planner.exact.warm_start import NOTHING_KNOWN
 from planner.geodesics import Geodesics
@@ -61,8 +62,8 @@ class SolverSource(PlanSource):
     """A plan source that calls a solver. Positions are snapped to the largest island of the navmesh.
 
     With the exact planner, plans that the participant does not see reuse earlier results. These are the full
-    table if it is small enough, or else the multipliers of the lower bound. The same sequence of states
-    always gives the same plans.
+    table if it is small enough, or else the multipliers of the lower bound. All searches after the first one
+    share a budget of states. The same sequence of states always gives the same plans.
 
     If `start` is set, `plan` returns a first plan within about 50 ms and starts a background search for a
     better one, which takes up to 20 s by default. The search reuses the multipliers of earlier bounds and the
@@ -81,6 +82,7 @@ class SolverSource(PlanSource):
         self.problems = TaskProblems(geodesics, capacity)
         self._solver, self._seed, self._limit = solver, seed, limit
         self._table = TaskTable(solver) if isinstance(solver, ExactSolver) else None
+        self._unseen = TaskSearch(solver, limit) if isinstance(solver, ExactSolver) else None
         self._warm = NOTHING_KNOWN
         self._planned: dict[str, XY] = {}  # positions of the loose objects when the plan was made
         self._search: _BackgroundSearch | None = None
@@ -146,14 +148,14 @@ class SolverSource(PlanSource):
         self._search = None
 
     def _solve(self, problem: RoutingProblem, *, shown: bool) -> Plan:
-        if shown or self._table is None:
+        if shown or self._table is None or self._unseen is None:
             return self._solver.solve(problem, seed=self._seed, limit=self._limit)
         plan = self._table.plan(problem)
-        if plan is None and self._warm.multipliers:
-            *_, plan = self._improving(problem, self._limit)
-        elif plan is None:
+        if plan is None and self._planned and self._unseen.applies(problem):
+            return self._unseen.plan(problem, seed=self._seed)
+        if plan is None:
             plan = self._solver.solve(problem, seed=self._seed, limit=self._limit)
-        self._warm = self._warm.updated(problem, plan)
+            self._unseen.learn(problem, plan)
         return plan
 
     def _new_search(self, state: TaskState, route: Route | None) -> _BackgroundSearch:

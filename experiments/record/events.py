@@ -13,6 +13,7 @@ from mjsim.values.actions import EventKind, Refusal
 from planner.plan import Status, VisitKind
 
 Metres = Annotated[float, msgspec.Meta(ge=0.0)]
+Bounds = tuple[Metres, Metres]
 VisitPair = tuple[VisitKind, str]
 
 
@@ -68,8 +69,10 @@ class VisitEvent(LoggedEvent, frozen=True):
         geodesic_m: Length in metres of the shortest walk from the person's position at the previous visit.
         location_m: Planner's distance in metres between the locations of the previous visit and this visit.
         regret_m: Extra length of the remaining task in metres compared with the best visit. It is null if
-            unknown, and absent in trials without regrets.
+            it is not proven or not known yet, and absent in trials without regrets.
         suggested_regret_m: Regret of the suggested visit in metres.
+        regret_bounds_m: Proven lower and upper bounds in metres on a regret that is null, or absent.
+        suggested_regret_bounds_m: The same bounds for the suggested visit.
     """
 
     kind: VisitKind
@@ -84,20 +87,26 @@ class VisitEvent(LoggedEvent, frozen=True):
     location_m: Metres
     regret_m: Metres | None = None
     suggested_regret_m: Metres | None = None
+    regret_bounds_m: Bounds | None = None
+    suggested_regret_bounds_m: Bounds | None = None
 
 
 class RegretEvent(LoggedEvent, frozen=True):
-    """The regrets of a visit were computed after the task.
+    """The regrets of a visit were computed after the visit was logged.
 
     Attributes:
         visit: Number of the visit, counted from 0.
         regret_m: As in `visit`.
         suggested_regret_m: As in `visit`.
+        regret_bounds_m: As in `visit`.
+        suggested_regret_bounds_m: As in `visit`.
     """
 
     visit: Count
     regret_m: Metres | None = None
     suggested_regret_m: Metres | None = None
+    regret_bounds_m: Bounds | None = None
+    suggested_regret_bounds_m: Bounds | None = None
 
 
 class ScrollEvent(LoggedEvent, frozen=True):

@@ -140,7 +140,7 @@ class Assistant:
             ahead=PlanView(self._board, observation, lambda: self._planner.route, self._paths_to),
             capacity=self._capacity,
             camera=camera,
-            regrets=self._planner.regrets,
+            regrets=functools.partial(self._planner.regrets, shown=True),
         )
         return shown_by(self._show, self._assistance, view)
 

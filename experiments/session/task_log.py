@@ -1,6 +1,8 @@
 """Log the plans and visits of a session, with suggested visits and regrets."""
 
 import itertools
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ from experiments.record.records import EventLog
 from mjsim.house.compiled.sites import ReceptacleGeometry
 from mjsim.values.episode import Episode
 from planner.plan import Status, Visit, VisitKind
+from planner.regret import RegretBounds
 from planner.route import Route, TaskState
 from planner.service import Planner
 
@@ -73,7 +76,7 @@ class TaskLog:
                 "suggested": _as_json(suggested) if suggested else None,
                 "deviated": route is not None and suggested != made,
                 **self._alternatives(state, made, suggested),
-                **(self._regret_fields(number, made, route) if self._regrets else {}),
+                **(self._regrets_of(number, made, route) if self._regrets else {}),
                 "position": [round(float(v), 6) for v in position],
                 "geodesic_m": round(walk.geodesic_distance, 6),
                 "location_m": round(location, 6),
@@ -87,7 +90,7 @@ class TaskLog:
     def finish(self, time: float) -> None:
         """Log the regrets that had not been computed yet when the visits were logged."""
         for (number, names), regret in self._planner.finish():
-            self._log.append(time, "regret", visit=number, **dict.fromkeys(names, _rounded(regret)))
+            self._log.append(time, "regret", visit=number, **_regret_fields(names, regret))
 
     def _distance_to(self, state: TaskState, made: Visit) -> float:
         place = state.deliveries[made.object]
@@ -110,18 +113,31 @@ class TaskLog:
             "tied": made != suggested and made.kind is VisitKind.PLACE and made.object in tied,
         }
 
-    def _regret_fields(self, number: int, made: Visit, route: Route | None) -> dict[str, float | None]:
+    def _regrets_of(self, number: int, made: Visit, route: Route | None) -> dict[str, Any]:
         proven = route is not None and route.plan.status is Status.OPTIMAL
         suggested = route.next if route else None
-        names: dict[Visit, tuple[str, ...]] = {made: ("regret_m",)}
+        names: dict[Visit, tuple[str, ...]] = {made: ("regret",)}
         other = suggested or made
-        names[other] = (*names.get(other, ()), "suggested_regret_m")
-        fields: dict[str, float | None] = {}
+        names[other] = (*names.get(other, ()), "suggested_regret")
+        fields: dict[str, Any] = {}
         for visit, keys in names.items():
-            known = proven and visit == suggested
-            regret = 0.0 if known else _rounded(self._planner.judge(visit, (number, keys)))
-            fields |= dict.fromkeys(keys, regret)
+            if proven and visit == suggested:
+                fields |= _regret_fields(keys, RegretBounds(0.0, 0.0, 0.0))
+                if visit == made:
+                    self._planner.follow(visit)
+            else:
+                fields |= _regret_fields(keys, self._planner.judge(visit, (number, keys)))
         return fields
+
+
+def _regret_fields(names: Sequence[str], found: RegretBounds | None) -> dict[str, Any]:
+    if found is None:
+        return {f"{name}_m": None for name in names}
+    if found.exact is not None:
+        return {f"{name}_m": round(found.exact, 6) for name in names}
+    bounds = [math.floor(found.lower * 1e6) / 1e6, math.ceil(found.upper * 1e6) / 1e6]
+    unproven = [{f"{name}_m": None, f"{name}_bounds_m": bounds} for name in names]
+    return {key: value for fields in unproven for key, value in fields.items()}
 
 
 def _plan_fields(route: Route) -> dict[str, Any]:
@@ -135,10 +151,6 @@ def _plan_fields(route: Route) -> dict[str, Any]:
 
 def _as_json(visit: Visit) -> list[str]:
     return [visit.kind.value, visit.object]
-
-
-def _rounded(metres: float | None) -> float | None:
-    return None if metres is None else round(metres, 6)
 
 
 def reach_bound(tour: float, house: House, episode: Episode) -> float:

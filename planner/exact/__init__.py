@@ -14,6 +14,7 @@ proof works" in docs/planners.md explains the method.
       multipliers     a lower bound from fitted Lagrangian multipliers
       expand, nodes   kernels that expand a layer of states and keep the best states
     cuts          branch and cut, for more than 24 objects
+    task_search   searches for successive states of a task, with one budget
     table_regret  costs of possible next visits
     warm_start    results of earlier plans that can be reused
 """

@@ -29,15 +29,17 @@ def improving_tours(
     deadline: Deadline,
     passes: tuple[tuple[int, int], ...],
     start: Start | None,
+    warm_rows: int = WARM_ROWS,
 ) -> Iterator[Solution]:
     """Yield a first tour with a lower bound, then the best tour and bound after each pass of the search.
 
-    `work` is the maximum number of states to expand. No pass begins after the deadline.
+    `work` is the maximum number of states to expand. `warm_rows` is the maximum number of rows in the table of
+    a warm start. No pass begins after the deadline.
     """
-    bound, upper, lower, actions = _first_tour(instance, seed, work, start)
-    yield Solution(actions, min(lower, upper), _certificate(bound))
+    bound, upper, lower, actions, expanded = _first_tour(instance, seed, work, start, warm_rows)
+    yield Solution(actions, min(lower, upper), _certificate(bound), expanded)
     done, rate, by_bin = 0, max(1, len(instance.home) // 2), False
-    for rows, wanted in passes:
+    for rows, wanted in passes if len(instance.home) <= MAX_SEARCHED else ():
         # An unfinished pass proves nothing, so choose a width that the remaining work allows.
         width = min(wanted, work // rate)
         if lower >= upper - instance.tie or width < min(wanted, done + 1) or deadline.over():
@@ -47,17 +49,18 @@ def improving_tours(
         bound = grown(bound, upper, rows, deadline)
         result = beam_pass(bound, upper, width, work, deadline)
         work -= result.expanded
+        expanded += result.expanded
         # A wider pass expands fewer states per unit of width.
         done, rate = width, max(1, -(-result.expanded // width))
         lower = max(lower, bound.root, result.lower)
         if result.actions is not None:
             upper, actions = result.upper, result.actions
-        yield Solution(actions, min(lower, upper), _certificate(bound))
+        yield Solution(actions, min(lower, upper), _certificate(bound), expanded)
 
 
 def _first_tour(
-    instance: Instance, seed: int, work: int, start: Start | None
-) -> tuple[Bound, int, int, list[int]]:
+    instance: Instance, seed: int, work: int, start: Start | None, warm_rows: int
+) -> tuple[Bound, int, int, list[int], int]:
     if start is None:
         length, order = anneal(instance, seed, ANNEALING_MOVES)
         bound = first_bound(instance, int(length))
@@ -65,15 +68,15 @@ def _first_tour(
         length, order = anneal_from(
             instance, seed, WARM_MOVES, warm_order(instance, start), *WARM_TEMPERATURES
         )
-        bound = warm_bound(instance, start, WARM_ROWS)
-    upper, lower = int(length), bound.root
+        bound = warm_bound(instance, start, warm_rows)
+    upper, lower, expanded = int(length), bound.root, 0
     actions: list[int] = tour_actions(instance, order).tolist()
-    if start is not None and len(instance.home) <= MAX_SEARCHED:
+    if start is not None and work > 0 and len(instance.home) <= MAX_SEARCHED:
         narrow = beam_pass(bound, upper, WARM_WIDTH, work, NEVER)
-        lower = max(lower, narrow.lower)
+        lower, expanded = max(lower, narrow.lower), narrow.expanded
         if narrow.actions is not None:
             upper, actions = narrow.upper, narrow.actions
-    return bound, upper, lower, actions
+    return bound, upper, lower, actions, expanded
 
 
 def _certificate(bound: Bound) -> Certificate:

@@ -67,6 +67,7 @@ class Solution:
     actions: list[int]
     bound: int  # lower bound on tour lengths, in units
     certificate: Certificate
+    expanded: int = 0  # number of states that the search has expanded so far
 
 
 def rows_of(group: NDArray[np.int64]) -> int:

@@ -47,17 +47,18 @@ def costs_in(
 
 def costs_by_pass(
     bound: Bound, visits: Sequence[Visit], longest: int, max_states: int, deadline: Deadline
-) -> Costs | None:
-    """Return the cost of each possible next visit in units. Costs above `longest` are not exact.
+) -> tuple[Costs | None, int]:
+    """Return the cost of each possible next visit in units, and the number of states.
 
-    The search visits every state on a tour of at most this length. A backward sweep then computes the
-    shortest remaining tour from each state. `visits` lists the possible next visits, places first. The
-    result is None if there are too many objects, more than `max_states` states, or the deadline has passed.
+    Costs above `longest` are not exact. The search visits every state on a tour of at most this length. A
+    backward sweep then computes the shortest remaining tour from each state. `visits` lists the possible next
+    visits, places first. The costs are None if there are too many objects, more than `max_states` states, or the
+    deadline has passed.
     """
     instance, table = bound.instance, bound.table
     n = len(instance.home)
     if n > MAX_SEARCHED:
-        return None
+        return None, 0
     limit = longest + 1 + bound.prices
     layers: list[Nodes] = []
     here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
@@ -66,12 +67,12 @@ def costs_by_pass(
     for _ in range(n + 1):
         expanded = expand(instance, table, here, after, limit, UNLIMITED, deadline)
         if expanded is None:
-            return None
+            return None, states
         here, after = expanded.here, expanded.after
         layers.append(here)
         states += int(here.size[0])
         if states > max_states:
-            return None
+            return None, states
         here, after = after, new_nodes(FIRST_ROOM)
     rest = [np.zeros(0, np.int64)] * (n + 1)
     beyond, nothing = here, np.zeros(0, np.int64)
@@ -81,7 +82,7 @@ def costs_by_pass(
     first = (layers[1], rest[1]) if n else (beyond, nothing)
     found = root_costs(instance, layers[0], rest[0], *first)
     # With a capacity of one, `found` may end with picks that are not in `visits`.
-    return {visit: int(cost) for visit, cost in zip(visits, found, strict=False)}
+    return {visit: int(cost) for visit, cost in zip(visits, found, strict=False)}, states
 
 
 @kernel

@@ -70,17 +70,23 @@ class TaskTable:
         carried = problem.names[len(problem.shipments) :]
         return costs_in(state.instance, state.table, state.row, state.names, carried), state.unit
 
+    def fits(self, problem: RoutingProblem) -> bool:
+        """Return True if a full table can be used for a problem."""
+        return self._solver.applies(problem) and self._solver.table_fits(_instance(problem))
+
     def _at(self, problem: RoutingProblem) -> TableState | None:
         state = _state(self._filled, problem) if self._filled is not None else None
         if state is not None:
             return state
-        if not self._solver.applies(problem):
+        if not self.fits(problem):
             return None
-        instance = make_instance(problem, problem.integers.metric)
-        if not self._solver.table_fits(instance):
-            return None
+        instance = _instance(problem)
         self._filled = _Filled(problem, instance, filled_table(instance))
         return _state(self._filled, problem)
+
+
+def _instance(problem: RoutingProblem) -> Instance:
+    return make_instance(problem, problem.integers.metric)
 
 
 def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:

@@ -4,6 +4,7 @@ import argparse
 import contextlib
 import json
 import threading
+import time
 
 import planning_cases
 import pytest
@@ -336,8 +337,71 @@ def test_visits_are_judged_after_the_task(geodesics):
             stop = list(RegretEvaluator(geodesics).all(task.state))[-1]
             for planner in (guide, inline):
                 planner.ask(task.state)
-            expected[number] = inline.judge(stop, number)
+            expected[number] = inline.judge(stop, number).exact
             assert guide.judge(stop, number) is None
             task.do(*stop)
-        assert dict(guide.finish()) == pytest.approx(expected, abs=1e-9)
+        found = {number: bounds.exact for number, bounds in guide.finish()}
+        assert found == pytest.approx(expected, abs=1e-9)
         assert guide.finish() == inline.finish() == []
+
+
+def test_neither_the_start_nor_the_end_waits_for_proofs_or_regrets(geodesics, monkeypatch):
+    go = threading.Event()
+
+    class Stuck(RegretEvaluator):
+        def limited(self, limit):
+            return Stuck(self._geodesics, limit=limit)
+
+        def all(self, *_):
+            go.wait(60)
+            return {}
+
+        def bounds(self, state, visit, plan=None):
+            if len(state.loose) < 4:
+                go.wait(60)
+            return super().bounds(state, visit, plan)
+
+    monkeypatch.setattr(planning_cases, "RegretEvaluator", Stuck)
+    task, script = Task(geodesics, 4, 1), Script(one_after_another(0, 1, 2, 3), nearest_first)
+    with live(geodesics, script) as guide:
+        started = time.monotonic()
+        guide.prepare(task.state, seconds=0.1)
+        visits = asked(guide, task.state).visits[:2]
+        for number, visit in enumerate(visits):
+            guide.judge(visit, number)
+            task.do(*visit)
+            guide.ask(task.state)
+        assert time.monotonic() - started < 10.0
+        found = dict(guide.finish())
+        assert time.monotonic() - started < 20.0
+        assert found[0].exact is not None
+        assert found[1] is None
+        script.go.set()
+        go.set()
+
+
+def test_regrets_that_are_not_computed_at_the_end_are_bounded(geodesics, monkeypatch):
+    monkeypatch.setattr("planner.service.FINISH_SECONDS", 0.0)
+    monkeypatch.setattr("planner.service.BOUNDS_SECONDS", 20.0)
+    begun, go = threading.Event(), threading.Event()
+
+    class Late(RegretEvaluator):
+        def limited(self, limit):
+            return Late(self._geodesics, solver=SEARCH, limit=limit)
+
+        def bounds(self, *args):
+            begun.set()
+            assert go.wait(20)
+            return super().bounds(*args)
+
+    monkeypatch.setattr(planning_cases, "RegretEvaluator", Late)
+    task, exact = Task(geodesics, 14, 1), RegretEvaluator(geodesics)
+    with live(geodesics, solver("greedy")) as guide:
+        guide.ask(task.state)
+        stop = list(exact.all(task.state))[-1]
+        guide.judge(stop, 0)
+        assert begun.wait(20)
+        threading.Timer(0.2, go.set).start()  # after `finish` has given up waiting
+        ((_, found),) = guide.finish()
+    assert found.exact is None
+    assert found.lower - 3e-3 <= exact.of(task.state, stop) <= found.upper + 3e-3

@@ -1,5 +1,7 @@
 """Compare the regrets of visits with regrets that are computed anew, and with lengths of tours."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,6 +9,7 @@ from hypothesis import strategies as st
 from planning_cases import Task, optimum, two_rooms
 
 from planner.exact.solver import ExactSolver
+from planner.exact.task_search import TaskSearch
 from planner.plan import Visit, VisitKind
 from planner.regret import RegretEvaluator, regrets
 from planner.solvers import SolveLimit, solver
@@ -110,3 +113,73 @@ def test_what_is_impossible_or_not_proven_has_no_regret(geodesics):
 
 def test_nothing_left_is_nothing_to_judge(geodesics):
     assert RegretEvaluator(geodesics).all(Task(geodesics, 0).state) == {}
+
+
+@pytest.mark.slow
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), work=st.sampled_from([1, 3_000, 100_000]))
+def test_bounds_hold_for_every_budget_and_wherever_the_person_stands(geodesics, seed, work):
+    task, rng = Task(geodesics, 11, seed), np.random.default_rng(seed)
+    exact = RegretEvaluator(geodesics)
+    search = RegretEvaluator(geodesics, solver=SEARCH, limit=SolveLimit(work=work))
+    while possible(task):
+        state = task.state
+        best = list(exact.all(state))
+        stop = best[0] if rng.random() < 0.5 else best[int(rng.integers(len(best)))]
+        found, truth = search.bounds(state, stop), exact.of(state, stop)
+        assert found.lower - 3e-3 <= truth <= found.upper + 3e-3
+        assert found.exact is None or found.exact == pytest.approx(truth, abs=3e-3)
+        task.do(*stop)
+        if rng.random() < 0.5:  # people reach for objects from a distance
+            x, y = geodesics.navmesh.snap(np.array(task.position) + rng.normal(0.0, 0.5, 2), math.inf)
+            task.position = float(x), float(y)
+
+
+def test_all_searches_of_a_task_share_one_budget(geodesics):
+    task, work = Task(geodesics, 14, 2), 30_000
+    search = TaskSearch(SEARCH, SolveLimit(work=work))
+    evaluator, left = RegretEvaluator(geodesics, solver=SEARCH, search=search), work
+    while len(task.loose) > 6:
+        evaluator.all(task.state)
+        stop = possible(task)[-1]
+        assert evaluator.bounds(task.state, stop) is not None
+        assert 0 <= search.left <= left
+        left = search.left
+        task.do(*stop)
+    assert left < work
+    search.spend(work)
+    found = evaluator.bounds(task.state, possible(task)[0])
+    assert search.left == 0
+    assert found.lower <= found.upper
+
+
+def test_a_proven_plan_that_is_followed_costs_no_search(geodesics):
+    """The rest of the plan is the proven plan of the next state if the person stands where the plan assumes."""
+    task, search = Task(geodesics, 12, 3), TaskSearch(SEARCH)
+    plan = SEARCH.solve(TaskProblems(geodesics).problem(task.state))
+    evaluator = RegretEvaluator(geodesics, solver=SEARCH, search=search)
+    for visit in plan.visits[:6]:
+        evaluator.follow(task.state, visit, plan)
+        task.do(*visit)
+    assert evaluator.bounds(task.state, plan.visits[6], plan).exact == pytest.approx(0.0, abs=1e-9)
+    assert search.left == TaskSearch(SEARCH).left
+
+
+def test_a_followed_plan_bounds_the_regret_of_a_later_deviation(geodesics):
+    """Without any search, the bounds are those of the plan, less the distance to where the plan assumes the person."""
+    task, exact = Task(geodesics, 13, 5), RegretEvaluator(geodesics)
+    plan = SEARCH.solve(TaskProblems(geodesics).problem(task.state))
+    apart = []
+    for follows in (True, False):
+        task, search = Task(geodesics, 13, 5), TaskSearch(SEARCH, SolveLimit(work=1))
+        evaluator = RegretEvaluator(geodesics, solver=SEARCH, search=search)
+        for visit in plan.visits[:4]:
+            if follows:
+                evaluator.follow(task.state, visit, plan)
+            task.do(*visit)
+        x, y = task.position
+        task.position = (x + 0.05, y)
+        found = evaluator.bounds(task.state, possible(task)[-1], plan)
+        assert found.lower - 3e-3 <= exact.of(task.state, possible(task)[-1]) <= found.upper + 3e-3
+        apart.append(found.upper - found.lower)
+    assert apart[0] < apart[1]

@@ -9,8 +9,10 @@ from planning_cases import BINS, SEARCH, Task, asked, planner_of, two_rooms
 from planner.errors import PlannerError, ProblemError, UnreachableError
 from planner.exact.solver import ExactSolver
 from planner.plan import Status, VisitKind
+from planner.regret import RegretEvaluator
 from planner.route import TaskState
-from planner.service import Mode
+from planner.service import Mode, Planner
+from planner.solver_source import SolverSource
 from planner.solvers import SolveLimit, solver
 from planner.task_problems import TaskProblems
 
@@ -188,3 +190,17 @@ def test_a_planner_that_fails_in_a_thread_fails_the_next_caller_that_needs_it(ge
         for needs in (lambda: guide.next, guide.regrets, guide.finish, lambda: guide.do(pytest.fail)):
             with pytest.raises(PlannerError, match="out of ideas"):
                 needs()
+
+
+def test_regrets_that_are_shown_leave_the_budget_of_those_that_are_logged(geodesics):
+    class Counting(RegretEvaluator):
+        def all(self, *args):
+            asked.append(self)
+            return super().all(*args)
+
+    asked, evaluator = [], Counting(geodesics)
+    guide = Planner(SolverSource(geodesics, solver("exact")), evaluator)
+    guide.ask(Task(geodesics, 4).state)
+    assert guide.regrets(shown=True) == guide.regrets() != {}
+    assert asked == [evaluator], "one budget for both"
+    assert guide.judge(guide.next, 0).exact == 0.0

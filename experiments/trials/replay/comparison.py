@@ -31,7 +31,7 @@ from experiments.trials.replay.replayer import Replayer
 # Events that a replay recomputes. Plans and regrets are copied from the log instead of being computed again,
 # so they are protected only by the hashes of the log.
 COMPARED_EVENTS = frozenset({*WORLD_EVENTS, "attempt", "visit", "plan", "end"})
-REGRETS = frozenset({"regret_m", "suggested_regret_m"})
+REGRETS = frozenset({"regret_m", "suggested_regret_m", "regret_bounds_m", "suggested_regret_bounds_m"})
 SIMULATED = (records.EVENTS, records.TRAJECTORY, records.RECORDING)  # files verified by the simulation
 DERIVED = (records.PLAN, records.METRICS)  # files computed from the files above
 

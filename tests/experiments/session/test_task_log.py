@@ -1,19 +1,25 @@
 """Plans that are not shown are made in a thread; the record is the same."""
 
 import contextlib
+import json
 import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from experiments.record.records import EventLog
+from experiments.cli.main import main
+from experiments.record.records import EVENTS, METRICS, EventLog, read_events
 from experiments.session.task_log import TaskLog, reach_bound
+from experiments.trials import setup
 from experiments.trials.setup import prepare_session, prepared_planner, regret_evaluator, solver_source
 from experiments.trials.trial_config import TrialConfig
 from mjsim.house.scene.scene import compose
+from planner.exact.solver import ExactSolver
 from planner.plan import Visit, VisitKind
+from planner.regret import RegretEvaluator
 from planner.service import Planner
+from planner.solvers import SolveLimit
 
 
 @pytest.mark.slow
@@ -34,6 +40,43 @@ def test_a_run_is_the_same_whether_plans_are_made_in_a_thread_or_inline(house, a
         runs.append((log.events, recorded["log_hash"].tolist(), recorded["state_hash"].tolist()))
     assert runs[0] == runs[1]
     assert sum(event["event"] == "plan" for event in runs[0][0]) > 1, "there was no deviation"
+
+
+def test_a_regret_that_is_not_proven_is_logged_as_bounds(tmp_path, monkeypatch):
+    """The record can be read and replayed, and measures treat the regret as unknown."""
+
+    def without_states(_, house):
+        searching = ExactSolver(table_bytes=0, passes=())
+        return RegretEvaluator(house.geodesics, solver=searching, limit=SolveLimit(work=1))
+
+    run, exact = tmp_path / "run", tmp_path / "exact"
+    words = [
+        "run",
+        "--objects",
+        "9",
+        "--seed",
+        "5",
+        "--assistance",
+        "none",
+        "--user",
+        "searcher",
+        "--time-limit",
+        "60",
+    ]
+    words += ["--fidelity", "event", "--no-video", "--no-floor-plan", "--out"]
+    assert main([*words, str(exact)]) == 0
+    monkeypatch.setattr(setup, "regret_evaluator", without_states)
+    assert main([*words, str(run)]) == 0
+    visits, truth = ([e for e in read_events(d / EVENTS) if e["event"] == "visit"] for d in (run, exact))
+    bounded = [(v, t) for v, t in zip(visits, truth, strict=True) if v["regret_m"] is None]
+    assert bounded
+    assert all(
+        v["regret_bounds_m"][0] - 3e-3 <= t["regret_m"] <= v["regret_bounds_m"][1] + 3e-3 for v, t in bounded
+    )
+    assert all("regret_bounds_m" not in v for v in visits if v["regret_m"] is not None)
+    assert not any("regret_bounds_m" in t for t in truth)
+    assert json.loads((run / METRICS).read_text())["unjudged_visits"] == len(bounded)
+    assert main(["replay", str(run)]) == 0
 
 
 PICK, PLACE = VisitKind.PICK, VisitKind.PLACE

@@ -1,0 +1,91 @@
+"""Searches for successive states of a task, which share one budget of states."""
+
+import math
+import time
+from dataclasses import replace
+
+from planner.exact.instance import Instance, make_instance, to_visits
+from planner.exact.solver import ExactSolver
+from planner.exact.warm_start import NOTHING_KNOWN, Start
+from planner.plan import Plan, Status
+from planner.problem import RoutingProblem, make_plan
+from planner.solvers import Deadline, SolveLimit
+
+TASK_WORK = 3_000_000  # default number of states that all searches of a task expand together
+TABLE_OBJECTS = 18  # number of objects from which on a full table replaces the searches
+PAUSE = 2  # number of objects that must be picked up before the next search after one without a proof
+HURRIED_ROWS = 600  # maximum number of rows in a table that is filled after the search was stopped
+SEARCHES = 2  # number of searches for each object that is picked up: after its pick and after its place
+
+
+class TaskSearch:
+    """A search that is repeated for successive states of a task, and expands a limited number of states in total.
+
+    Each search may use an equal share of the remaining states, so that early searches, which are the hardest
+    ones, leave states for later ones. After a search without a proof, two objects must be picked up before the
+    next one. A search without multipliers of an earlier plan may use half of the states, because its
+    multipliers serve all later searches. Without states, a plan results from annealing and these multipliers.
+    Results are reproducible unless `limit` contains a time or a stop event.
+
+    Args:
+        solver: Exact planner, whose passes are used.
+        limit: Limit whose `work` applies to all searches together. `seconds` applies to each search.
+
+    Attributes:
+        left: Number of states that may still be expanded.
+    """
+
+    def __init__(self, solver: ExactSolver, limit: SolveLimit | None = None) -> None:
+        self.left = (limit and limit.work) or TASK_WORK
+        self._solver = solver
+        self._warm = NOTHING_KNOWN
+        self._most = math.inf  # number of loose objects up to which a proof seems possible
+
+    def applies(self, problem: RoutingProblem) -> bool:
+        return self._solver.applies(problem)
+
+    def learn(self, problem: RoutingProblem, plan: Plan) -> None:
+        """Use the multipliers and the order of a plan for this problem in later searches."""
+        self._warm = self._warm.updated(problem, plan)
+
+    def start(self, problem: RoutingProblem, instance: Instance) -> Start | None:
+        """Return a warm start for a problem, or None if nothing is known about its objects."""
+        return self._warm.numbered(problem.names[: len(problem.shipments)], instance.unit)
+
+    def share(self, problem: RoutingProblem) -> int:
+        """Return the number of states that a search for this problem may expand."""
+        if not self._warm.multipliers:
+            return self.left // 2
+        if len(problem.shipments) > self._most:
+            return 0
+        return self.left // (SEARCHES * max(1, len(problem.shipments) - TABLE_OBJECTS))
+
+    def spend(self, states: int) -> None:
+        self.left = max(0, self.left - states)
+
+    def plan(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
+        """Return the best plan within the share of this problem, to which the solver must apply."""
+        # Imported here because it takes 0.5 s to import.
+        from planner.exact.search import WARM_ROWS, improving_tours
+
+        started, metric = time.perf_counter(), problem.integers.metric
+        instance, n = make_instance(problem, metric), len(problem.shipments)
+        stopped = limit is not None and limit.stopped
+        work, rows = (0, HURRIED_ROWS) if stopped else (self.share(problem), WARM_ROWS)
+        start = self.start(problem, instance)
+        *_, best = improving_tours(instance, seed, work, deadline(limit), self._solver.passes, start, rows)
+        self.spend(best.expanded)
+        visits = to_visits(instance, best.actions, problem.names[:n], problem.names[n:])
+        plan = make_plan(problem, metric, visits, best.bound, started, best.certificate)
+        if work and plan.status is not Status.OPTIMAL:
+            self._most = min(self._most, n - PAUSE)
+        is_better = plan.status is Status.OPTIMAL or not self._warm.multipliers
+        self.learn(problem, plan if is_better else replace(plan, certificate=None))
+        return plan
+
+
+def deadline(limit: SolveLimit | None) -> Deadline:
+    """Return the deadline of a search that starts now."""
+    if limit is None:
+        return Deadline(None)
+    return Deadline(None if limit.seconds is None else time.perf_counter() + limit.seconds, limit.stop)
