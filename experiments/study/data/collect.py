@@ -72,7 +72,7 @@ async def collect(study: Study, store: Store, folder: Path) -> Collected:
     unusable: dict[str, str] = {}
     items = study.texts[SURVEY].items
     finished = [person for person in people if person.id in trials]
-    unfinished = Counter(person.status for person in people if person.id not in trials)
+    unfinished: Counter[str] = Counter(person.status for person in people if person.id not in trials)
     paths = [folder / trials[person.id].folder for person in finished]
     for person, run in zip(finished, read_runs(paths, _processes()), strict=True):
         trial = trials[person.id]
