@@ -152,6 +152,7 @@ def test_a_shard_reads_its_own_trials_only_and_writes_no_tables(whole, tmp_path,
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_shards_with_packed_trials_merge_into_what_one_machine_makes(whole, tmp_path):
     """Each shard has archives of its own, which it never shares with another machine; the parts are not changed."""
     shared, parts = tmp_path / "shared", [tmp_path / "one", tmp_path / "two"]

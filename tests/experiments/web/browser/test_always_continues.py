@@ -101,6 +101,7 @@ def remains(page, expression, seconds=5.0):
         time.sleep(0.2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("browser", "draw"), [("chromium", "auto"), ("firefox", "server")])
 def test_a_mute_connection_is_replaced_and_a_held_key_still_walks(tmp_path, request, browser, draw):
     page = request.getfixturevalue(f"{browser}_page")

@@ -14,7 +14,7 @@ from tests.experiments.web.browser.key_presser import choose
 from tests.experiments.web.browser.pages import pass_story
 from tools.drawn_pairs import decoded, ssim
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 
 LEAST = 0.95  # SSIM, as of the pairs of pictures
 STILL = 6.0  # s after which messages have faded, and the page has told its size
@@ -22,7 +22,7 @@ STILL = 6.0  # s after which messages have faded, and the page has told its size
 
 @pytest.mark.parametrize(
     ("width", "height", "degrees"),
-    [(800, 600, None), pytest.param(1280, 720, 105, marks=pytest.mark.long)],
+    [(800, 600, None), (1280, 720, 105)],
 )
 def test_the_film_shows_what_the_window_showed(tmp_path, chromium_page, width, height, degrees):
     page = chromium_page

@@ -23,7 +23,7 @@ from tests.experiments.web.browser.key_presser import WATCH
 from tests.experiments.web.browser.pages import FIREFOX, XVFB, Chromium, firefox, virtual_screen
 from tests.experiments.web.browser.study_visit import STUDY, StudyVisit
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 
 RECRUITMENT = """
 [study.recruitment]
