@@ -19,6 +19,7 @@ from tests.planning_cases import optimum, random_problem
 SEARCH = ExactSolver(table_bytes=0)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),

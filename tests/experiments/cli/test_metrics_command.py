@@ -78,6 +78,7 @@ def test_a_batch_gives_a_row_per_trial_and_names_those_that_cannot_be_measured(b
     assert "one" in printed.err and len(printed.out.splitlines()) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("server", ["", "none"])
 def test_people_who_play_are_measured_and_get_into_a_study(finished, tmp_path, capsys, server):
     folder = tmp_path / "play"

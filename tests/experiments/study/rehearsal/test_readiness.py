@@ -247,7 +247,6 @@ def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
     assert [fault for fault in walked.faults if "cannot be used" not in fault] == []
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_a_dry_run_finds_a_phase_that_takes_anything(tmp_path, monkeypatch):
     short = 'minutes = 10\nphases = ["consent", "task", "survey", "completion"]'

@@ -171,7 +171,6 @@ def test_a_habitat_scene_is_a_stage_with_objects_in_their_places(tmp_path):
     np.testing.assert_allclose(high, (2.25, 1.4, 0.9), atol=0.02)
 
 
-@pytest.mark.slow
 def test_an_mjcf_scene_stands_still_and_walls_that_were_only_seen_are_solid(tmp_path):
     decisions, catalogue = imported(tmp_path, write_mjcf(tmp_path))
     house = compiled_house(catalogue)
