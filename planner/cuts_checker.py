@@ -26,9 +26,8 @@ MAX_SUM = 1 << 62  # maximum sum of lengths and multipliers, so that no sum over
 EXACT = 1e-15  # error of distances that count as multiples of the unit, relative to the largest distance
 
 Whole = NDArray[np.int64]
-Arc = tuple[
-    int, int, int, int, int
-]  # first node, last node, length, how often a tour may use it, object or -1
+# First node, last node, length in units, maximum number of uses in a tour, and object that is picked up or -1
+Arc = tuple[int, int, int, int, int]
 
 
 def cuts_bound(problem: RoutingProblem, certificate: Certificate) -> float:
@@ -47,39 +46,46 @@ def cuts_bound(problem: RoutingProblem, certificate: Certificate) -> float:
     arcs = np.array(list(_arcs(problem, whole, places, home)), np.int64)
     tail, head, length, most, picks = arcs.T
     prices = np.array(certificate.multipliers, np.int64)
-    largest = (
-        int(whole.max()) * certificate.parts
-        + int(np.abs(prices).max())
-        + sum(m for _, m, _ in certificate.cuts)
-    )
-    if largest * nodes >= MAX_SUM:
-        raise ProblemError("the multipliers of the certificate are too large")
-    if not all(0 <= node < nodes - 2 for _, _, inside in certificate.cuts for node in inside):
-        raise ProblemError("a cut of the certificate contains the start or an unknown node")
+    _check_cuts(certificate, int(whole.max()), nodes)
     reduced = length * certificate.parts - np.append(prices, 0)[picks]
     for k, multiplier, inside in certificate.cuts:
         within = np.zeros(nodes, bool)
         within[list(inside)] = True
         reduced -= multiplier * (within[head] & ~within[tail])
         reduced += multiplier * (within[head] & (picks == k))
-    distance = np.full(nodes, MAX_SUM)
-    distance[nodes - 2] = 0
-    for _ in range(nodes):
-        shorter = distance.copy()
-        np.minimum.at(shorter, head, distance[tail] + reduced)
-        if (shorter == distance).all():
-            break
-        distance = shorter
+    distance = _shortest_walks(tail, head, reduced, nodes)
     reached = distance[tail] < MAX_SUM // 2
     short = np.where(reached, np.minimum(reduced + distance[tail] - distance[head], 0), 0)
-    bound = -(
-        -(int(distance[nodes - 1]) + int(prices.sum()) + int((most * short).sum())) // certificate.parts
-    )
+    total = int(distance[nodes - 1]) + int(prices.sum()) + int((most * short).sum())
+    bound = -(-total // certificate.parts)
     if certificate.root > bound:
         raise ProblemError(
             f"the certificate's root claims {certificate.root} units, but its cuts yield only {bound}"
         )
     return certificate.unit * (bound - rounding * legs)
+
+
+def _check_cuts(certificate: Certificate, longest: int, nodes: int) -> None:
+    """Check that sums of lengths do not overflow, and that all cuts consist of known nodes without the start."""
+    price = max(map(abs, certificate.multipliers))
+    largest = longest * certificate.parts + price + sum(m for _, m, _ in certificate.cuts)
+    if largest * nodes >= MAX_SUM:
+        raise ProblemError("the multipliers of the certificate are too large")
+    if not all(0 <= node < nodes - 2 for _, _, inside in certificate.cuts for node in inside):
+        raise ProblemError("a cut of the certificate contains the start or an unknown node")
+
+
+def _shortest_walks(tail: Whole, head: Whole, length: Whole, nodes: int) -> Whole:
+    """Return the lengths of shortest walks from the start to all nodes, with at most as many arcs as nodes."""
+    distance = np.full(nodes, MAX_SUM)
+    distance[nodes - 2] = 0
+    for _ in range(nodes):
+        shorter = distance.copy()
+        np.minimum.at(shorter, head, distance[tail] + length)
+        if (shorter == distance).all():
+            break
+        distance = shorter
+    return distance
 
 
 def _whole(problem: RoutingProblem, certificate: Certificate) -> tuple[Whole, float]:

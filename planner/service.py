@@ -61,9 +61,8 @@ class Planner:
         self._stop = threading.Event()  # set to stop the computation of regrets
         self._over = threading.Event()  # set to stop the computation of the regrets of completed visits
         live = mode is Mode.LIVE
-        self._judges = (
-            ThreadPoolExecutor(1, "regrets") if live else None
-        )  # one thread, in the order of visits
+        # One thread computes the regrets of completed visits, in the order of the visits.
+        self._judges = ThreadPoolExecutor(1, "regrets") if live else None
         # Evaluators for completed visits, and for regrets that are shown. They share neither tables nor, except
         # in live mode, budgets, so logged regrets do not depend on which pictures are drawn.
         self._judge = evaluator.limited(SolveLimit(stop=self._over)) if live else evaluator

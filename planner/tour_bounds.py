@@ -40,7 +40,7 @@ class TourBounds:
     def __init__(self, solver: ExactSolver, search: TaskSearch, walk: Callable[[XY, XY], float]) -> None:
         self._solver, self._search, self._walk = solver, search, walk
         self._kept: dict[Visit, _Kept] = {}  # plans after visits of the last state
-        self._last: tuple[RoutingProblem, Plan] | None = None  # problem and plan of the last state
+        self._last: tuple[RoutingProblem, Plan] | None = None  # the last state's problem, and the plan for it
 
     def before(
         self, state: TaskState, problem: RoutingProblem, plan: Plan | None, limit: SolveLimit | None

@@ -34,7 +34,7 @@ from mjsim.values.person_parameters import PersonParameters
 from planner.errors import PlannerError
 from planner.solvers import solver
 
-# The function that finds the value of a setting, and raises an error if there is none
+# Functions that look up a name in a setting, and raise an error if it is unknown
 NAMES: Mapping[str, Callable[[str], object]] = {
     "user": participant,
     "assistance": condition,

@@ -51,8 +51,6 @@ def view_limits(text: str) -> tuple[float, float]:
 
 def drawn_person(described: Distributions, rng: "np.random.Generator") -> PersonParameters:
     """Draw the parameters of a person. Raises `ConfigError` if a name or a distribution is invalid."""
-    if not described:
-        return _DEFAULT
     return _person(draw(PARAMETERS, described, rng, "a person"))
 
 

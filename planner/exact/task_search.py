@@ -15,7 +15,7 @@ TASK_WORK = 3_000_000  # default number of states that all searches of a task ex
 TABLE_OBJECTS = 18  # number of objects from which on a full table replaces the searches
 PAUSE = 2  # number of objects that must be picked up before the next search after one without a proof
 HURRIED_ROWS = 600  # maximum number of rows in a table that is filled after the search was stopped
-SEARCHES = 2  # number of searches for each object that is picked up: after its pick and after its place
+SEARCHES = 2  # number of searches per object, one after it is picked up and one after it is placed
 
 
 class TaskSearch:

@@ -15,7 +15,7 @@ class RootBound(NamedTuple):
 
     value: int  # lower bound in units
     prices: NDArray[np.int64]  # multiplier of each object in parts, shape (n,)
-    cuts: tuple[tuple[Cut, int], ...]  # cuts with their positive multipliers in parts
+    cuts: tuple[tuple[Cut, int], ...]  # each cut that contributes to the bound, with its multiplier in parts
     least: NDArray[np.int64]  # lower bound in parts on tours that use each arc, shape (arcs,)
 
 
