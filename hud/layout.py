@@ -84,7 +84,7 @@ def margins(width: int, height: int) -> tuple[int, int, int, int]:
 
 
 def picture_rect(width: int, height: int) -> Rect | None:
-    """Return the area of the picture in a frame, or None if the panels are over the picture.
+    """Return the part of a frame that shows the picture, or None if the panels overlap the picture.
 
     The panels are next to the picture if the frame is wide and large enough for legible text.
     """

@@ -22,7 +22,7 @@ class IntegerDistances:
 
     unit: float  # length of one unit in metres
     tie: int  # maximum difference between tours that count as equal, in units
-    rounding: float  # maximum rounding error of a leg in units, 0 if the unit is exact
+    rounding: float  # maximum rounding error of a leg in units; 0 if all distances are multiples of the unit
     used: Sequence[int]  # indices of the locations that every tour visits
     # Symmetric matrix of rounded distances, 0 for locations that no tour visits, shape (k, k)
     legs: NDArray[np.int64]

@@ -84,7 +84,7 @@ class PlanSource(abc.ABC):
 
     @abc.abstractmethod
     def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:
-        """Return a new route for a state, given the previous one. `shown` has the meaning of `Planner.ask`."""
+        """Return a new route for a state, given the previous one. `Planner.ask` explains `shown`."""
 
     def check(self, state: TaskState) -> None:  # noqa: B027 - optional
         """Raise UnreachableError if objects cannot be fetched or delivered. The error lists their names."""

@@ -76,7 +76,7 @@ class ParticipantEvent(LoggedEvent, frozen=True):
 
 
 class PhaseBegunEvent(LoggedEvent, frozen=True, tag="phase_begun"):
-    """A phase before the task began. The task clock stays at 0.
+    """The beginning of a phase that precedes the task. The task clock stays at 0.
 
     Attributes:
         phase: `story`, `flythrough` or `training`.
@@ -86,7 +86,7 @@ class PhaseBegunEvent(LoggedEvent, frozen=True, tag="phase_begun"):
 
 
 class PhaseEndedEvent(LoggedEvent, frozen=True, tag="phase_ended"):
-    """A phase before the task ended.
+    """The end of a phase that precedes the task.
 
     Attributes:
         phase: As in `phase_begun`.

@@ -137,7 +137,7 @@ def _pieces(model: Any, pictures: dict[str, _Picture]) -> Iterator[ScenePiece]:
     alpha = np.where(model.geom_matid >= 0, material_alpha, model.geom_rgba[:, 3])
     shown = np.isin(model.geom_group, _SEEN) & (alpha > 0)
     bodies = model.geom_bodyid
-    # Many bodies have both visual and collision geoms. If there are only visual geoms, these collide.
+    # Many bodies have both visual and collision geoms. In other bodies, the visual geoms are solid as well.
     has_solid = np.isin(bodies, np.unique(bodies[collides])) & (bodies > 0)
     decor = np.flatnonzero(shown & ~collides)
     for geom in range(model.ngeom):

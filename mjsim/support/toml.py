@@ -1,4 +1,4 @@
-"""Read TOML files, and find the lines of their keys."""
+"""Read TOML files, and find the line numbers of their keys."""
 
 import re
 import tomllib

@@ -41,7 +41,7 @@ def drops(m: int, held: int, other: int) -> tuple[tuple[int, int, int], ...]:
 
 @kernel
 def length(inst: Instance, i: int, b: int, then: int, x: int) -> int:
-    """Return the path length from object i, or the root if i is -1, to object x via bins b and `then`."""
+    """Return the length of the path from object i to bin b, bin `then` and object x. If i is -1, start at the root."""
     m = inst.bins.shape[0]
     if b == m:
         if x < 0:

@@ -22,7 +22,7 @@ Costs = dict[Visit, int]  # length of the remaining tour in units, by next visit
 def costs_in(
     instance: Instance, table: CostTable, row: int, names: Sequence[str], carried: Sequence[str]
 ) -> Costs:
-    """Return the cost of each possible next visit. A relaxed table gives lower bounds that include prices.
+    """Return the cost of each possible next visit. If the table is relaxed, return lower bounds, plus the prices.
 
     `row` is the table row of the objects that remain at the start. `names` contains the names of the
     instance's objects, and `carried` the names of the carried objects.

@@ -1,4 +1,4 @@
-"""Searches for successive states of a task, which share one budget of states."""
+"""Search for plans of successive task states. All searches together expand a limited number of states."""
 
 import math
 import time

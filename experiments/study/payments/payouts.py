@@ -30,7 +30,7 @@ class Sent:
 
 
 class Sender:
-    """A client that sends owed payments to the recruitment platform.
+    """A client that makes due payments through the recruitment platform.
 
     Each attempt is recorded in the ledger before the request is sent. If the outcome of an attempt is unknown, the
     payment is sent again only if it is still missing from the platform's lists after a waiting time.

@@ -31,13 +31,13 @@ class VisitPages:
         return page(request, template, status, common=common, lang=lang, **values)
 
     def message(self, request: Request, name: str, status: int = 200) -> Response:
-        """Show a page with a message. `name` is the name of the message in the texts."""
+        """Show a page with a message. `name` is the key of the message in the text files."""
         words = self._plan.texts["welcome"]
         heading = {"title": words[f"{name}_title"]}
         return self.show(request, "study", status, section=heading, paragraphs=[words[name]])
 
     def closed(self, request: Request, name: str) -> Response:
-        """Show a message to a person who is not admitted. `name` is the name of the message in the texts."""
+        """Show a message to a person who is not admitted. `name` is the key of the message in the text files."""
         remembers = self._recruiter.platform == "link"
         return self._last(request, "welcome", name, "withdrawn", "closed", remembers=remembers)
 

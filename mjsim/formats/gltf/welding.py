@@ -72,7 +72,7 @@ def _welded_box(surface: GeomSurface, lines: dict[_Line, NDArray[np.int64]]) -> 
 
 
 def _outline(side: NDArray[np.int64], lines: dict[_Line, NDArray[np.int64]]) -> Iterable[Floats]:
-    """Yield the shares of the corners of a side (4, 3) in each vertex around the side, each of shape (4,)."""
+    """Yield each vertex on the outline of a side as weights of the side's four corners, shape (4,)."""
     for start in range(_CORNERS):
         end = (start + 1) % _CORNERS
         yield _ONES[start]

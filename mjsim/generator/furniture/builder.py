@@ -135,7 +135,7 @@ class Builder:
         x: float = 0.0,
         doors: bool = False,
     ) -> None:
-        """Add a grid of drawer fronts or doors with handles, whose backs are at depth `y`."""
+        """Add a grid of drawer fronts or doors with handles. The backs of the fronts are at depth `y`."""
         wide, high = (w - GAP) / columns, (z[1] - z[0] - GAP) / rows
         for i in range(columns):
             for j in range(rows):

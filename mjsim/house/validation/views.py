@@ -1,4 +1,4 @@
-"""Draw outlines of models for the images of the `mjsim check` command. OpenGL is not required."""
+"""Draw outlines of models for the images that `mjsim check` writes, without OpenGL."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -138,7 +138,7 @@ def _last(span: Span, way: int) -> Span:
 
 
 def _beyond(span: Span, way: int, cells: int) -> Span:
-    """Return the first `cells` cells after a span in direction `way` (1 or -1), or the span if `way` is 0."""
+    """Return `cells` cells after the span (`way` is 1) or before it (-1), or the span itself (0)."""
     start, stop = span
     return {1: (stop, stop + cells), 0: span, -1: (start - cells, start)}[way]
 

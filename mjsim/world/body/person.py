@@ -1,4 +1,4 @@
-"""The person in the physics simulation, and the basic movements of which picks and places consist."""
+"""The person in the physics simulation, and the basic movements that make up picks and places."""
 
 import math
 from collections.abc import Callable, Generator, Iterator
@@ -39,7 +39,7 @@ class Person:
     held: list[int | None] = field(default_factory=lambda: [None, None])
     # Velocity of each hand's target while no motion moves the hand, in m/s, shape (2, 3).
     hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
-    moving_hand: int | None = None  # hand that the current motion moves, or None
+    moving_hand: int | None = None  # index of the hand with a motion, or None
     receptacle_heights: ReceptacleHeights = field(init=False)
     posture_pace: NDArray[np.float64] = field(init=False)  # see `Hands.pace` in `mjsim.world.body.postures`
 

@@ -1,4 +1,4 @@
-"""Models of flows for MathOpt: fractional flows, which GLOP minimizes, and integer flows, which HiGHS minimizes."""
+"""Models of shortest flows for MathOpt. GLOP finds fractional flows, and HiGHS finds integer flows."""
 
 import math
 import time
