@@ -51,7 +51,7 @@ Answer = Callable[[Pick | Place], ActionResult]
 
 @dataclass(frozen=True)
 class Controls:
-    """The latest input, the target angles of the mouse in radians, and queued key presses with their ages in seconds."""
+    """The latest input, the target angles of the mouse in radians, and queued key presses with ages in seconds."""
 
     held: Input | None = None
     heading: float | None = None
