@@ -91,7 +91,7 @@ def _measured(path: Path) -> Mapping[str, Any]:
 
     with opened_run(path) as run:
         check_log(run)
-        trial = read_trial(run)
+        trial = read_trial(run, recompute=True)
     if not trial.as_measured:
         print(
             f"mjsim: {path}: metrics.json differs from these metrics of the log, or is missing",

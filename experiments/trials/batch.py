@@ -117,7 +117,8 @@ def run_batch(
             remove_leftovers(out / TRIALS)
             if archives is not None and adopt(out / TRIALS, archives, WAIT_S):
                 note("a worker is still writing its archive; repeat the command to read its trials")
-            found, unusable = reader.read()
+            changed = plan.missing or plan.notes
+            found, unusable = reader.read() if changed else (plan.stored, plan.unusable)
             if shard is None:
                 rows = write_rows(trials, out, found, unusable, note)
             else:

@@ -53,11 +53,15 @@ class BatchPlan:
         done: Trials of the design that are in the folder and would still have the same result.
         missing: Settings of all other trials of the design, by run directory.
         notes: Messages that explain which trials are rerun and why.
+        stored: All trials in the folder, before outdated ones were moved.
+        unusable: Error message for each trial in the folder that cannot be read.
     """
 
     done: tuple[StoredTrial, ...]
     missing: Mapping[Path, TrialConfig]
     notes: tuple[str, ...]
+    stored: Sequence[StoredTrial]
+    unusable: Mapping[Path, str]
 
 
 def plan_batch(
@@ -95,7 +99,7 @@ def plan_batch(
         missing[path] = trial
     put_aside(out, outdated, prefix)
     discard(out / TRIALS, early, prefix=prefix)
-    return BatchPlan(tuple(done), missing, tuple(_notes(reasons, out)))
+    return BatchPlan(tuple(done), missing, tuple(_notes(reasons, out)), stored, unusable)
 
 
 def _why_again(trial: StoredTrial, inputs: Inputs) -> str:

@@ -253,6 +253,8 @@ def confounded_rows(rows: Sequence[Mapping[str, Any]]) -> str | None:
     faults = []
     for name in CONFOUNDERS:
         values: dict[str, set[str]] = {}
+        if all(row.get(name) == rows[0].get(name) for row in rows):
+            continue
         for row in rows:
             values.setdefault(str(row["assistance"]), set()).add(str(row.get(name)))
         if len({frozenset(v) for v in values.values()}) > 1:

@@ -17,13 +17,13 @@ from mjsim.values.person_parameters import RANGES, PersonParameters
 if TYPE_CHECKING:
     import numpy as np
 
-_DEFAULT = PersonParameters()
+DEFAULT = PersonParameters()
 PARAMETERS: Mapping[str, Parameter] = {
-    **{name: Parameter(getattr(_DEFAULT, name), *RANGES[name]) for name in RANGES},
+    **{name: Parameter(getattr(DEFAULT, name), *RANGES[name]) for name in RANGES},
     **{
         f"{group}.{name}": Parameter(value, 0.0, math.inf, "")
         for group in GROUPS
-        for name, value in getattr(_DEFAULT, group)._asdict().items()
+        for name, value in getattr(DEFAULT, group)._asdict().items()
     },
 }
 

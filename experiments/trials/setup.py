@@ -20,7 +20,7 @@ from experiments.session.session import Session, Viewer
 from experiments.session.task_board import TaskBoard
 from experiments.session.user_code import make_participant
 from experiments.trials.fingerprint import fingerprint, trial_inputs
-from experiments.trials.person import check_person, drawn_person
+from experiments.trials.person import DEFAULT, check_person, drawn_person
 from experiments.trials.trial_config import TrialConfig
 from mjsim.house.scene.scene import Scene
 from mjsim.values.episode import Episode
@@ -54,7 +54,7 @@ def draw_person(config: TrialConfig) -> PersonParameters:
         raise ConfigError(f"participant {config.user!r}: {error}") from error
     described = of_participant.updated(config.person)
     if not described:
-        return PersonParameters()
+        return DEFAULT
     return drawn_person(described, _session_rng(config.person_seed, _PERSON))
 
 

@@ -1,6 +1,7 @@
 """A finished trial is read once, and again only after it has changed."""
 
 import gzip
+import json
 import os
 import shutil
 
@@ -9,7 +10,9 @@ from msgspec.structs import replace
 
 from experiments.participants.distribution import Distributions
 from experiments.record import records
-from experiments.trials import trial_reader
+from experiments.record.files import CHECKSUMS
+from experiments.record.metrics import measure
+from experiments.trials import batch_folder, trial_reader
 from experiments.trials.batch import run_batch
 from experiments.trials.batch_folder import read_trial
 from experiments.trials.design import Design
@@ -59,6 +62,35 @@ def test_what_is_kept_equals_what_is_read(folder, read):
     assert read == ["t0", "t1", "t2"] and unusable == {}
     assert second == first == [read_trial(trial.path) for trial in first]
     assert repr([t.row for t in second]) == repr([t.row for t in first])  # in types and order, too
+
+
+def test_metrics_of_the_same_versions_are_read_and_others_are_computed(folder, monkeypatch):
+    path, computed = folder / "trials" / "t0", []
+
+    def measured(*given):
+        computed.append(path)
+        return measure(*given)
+
+    monkeypatch.setattr(batch_folder, "measure", measured)
+    found = read_trial(path)
+    assert not computed and found.as_measured
+    again = read_trial(path, recompute=True)
+    assert computed == [path] and again == found and list(again.row) == list(found.row)
+    monkeypatch.setattr(batch_folder, "_versions", lambda: {**again.inputs, "numpy": "0"})
+    assert read_trial(path) == found and len(computed) == 2
+
+
+@pytest.mark.parametrize("file", [records.METRICS, CHECKSUMS])
+def test_metrics_with_a_wrong_checksum_are_computed(folder, file):
+    path = folder / "trials" / "t0"
+    row = read_trial(path).row
+    forged = json.loads((path / records.METRICS).read_text()) | {"delivered": 9}
+    (path / records.METRICS).write_text(json.dumps(forged))
+    if file == CHECKSUMS:  # a line is missing
+        lines = (path / CHECKSUMS).read_text().splitlines(keepends=True)
+        (path / CHECKSUMS).write_text("".join(line for line in lines if records.METRICS not in line))
+    trial = read_trial(path)
+    assert trial.row == row and not trial.as_measured
 
 
 def test_a_folder_that_was_moved_is_not_read_again(folder, read):
