@@ -82,7 +82,7 @@ class StandingPlaces:
             ahead = DOORWAY_DEPTH * np.array([-across[1], across[0]])
             if self.rooms.room_at(point + ahead) == self.rooms.room_at(point - ahead):
                 continue
-            for part in (-1.0, 0.0, 1.0):
+            for part in np.linspace(-1.0, 1.0, 5):  # walls are thicker than the distance of these parts
                 start = (*(point + part * ahead), REACH_HEIGHT)
                 sides = (first_hit(self.model, self.data, start, side)[0] for side in (across, -across))
                 if sum(sides) < DOORWAY_WIDTH:

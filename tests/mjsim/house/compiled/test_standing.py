@@ -38,7 +38,14 @@ def test_an_object_is_free_on_this_side_of_a_wall_only(by_the_door):
 
 @pytest.mark.parametrize(
     ("point", "is_doorway"),
-    [((3.0, 2.0), True), ((3.2, 2.2), True), ((2.6, 2.0), False), ((2.7, 3.0), False), ((4.5, 2.0), False)],
+    [
+        ((3.0, 2.0), True),
+        ((3.1, 1.75), True),
+        ((3.2, 2.2), True),
+        ((2.6, 2.0), False),
+        ((2.7, 3.0), False),
+        ((4.5, 2.0), False),
+    ],
 )
 def test_a_doorway_has_walls_on_two_sides_and_rooms_on_the_others(by_the_door, point, is_doorway):
     """The rooms east:1 and east:2 are one room, whose halves meet at y = 2 m."""
@@ -80,7 +87,9 @@ class Doorways:
 
 def test_a_bin_that_needs_a_doorway_is_recognised(by_the_door):
     crate = by_the_door.receptacles["crate"]
-    crate = dataclasses.replace(crate, center=np.add(crate.center, (0.0, 0.6, 0.0)))  # 0.1 m in front of the doorway
+    crate = dataclasses.replace(
+        crate, center=np.add(crate.center, (0.0, 0.6, 0.0))
+    )  # 0.1 m in front of the doorway
     doorway, room = np.array([3.0, 2.0]), np.array([1.9, 1.7])
     standing = dataclasses.replace(by_the_door.standing, navigable=Doorways(by_the_door.standing))
     assert standing.is_free(doorway, crate)
