@@ -41,7 +41,10 @@ class Approach:
         self._latest[answer.object] = made, percept.position.copy()
 
     def elsewhere(self, percept: Percept, visit: Visit, goal: Goal) -> Point | None:
-        """Return the nearest place away from all failed attempts, or None if there were few or none is left."""
+        """Return the nearest place away from all failed attempts.
+
+        Return None after fewer than `MAX_FAILURES` failures, or if there is no other place.
+        """
         failed = self._failed.get(visit, [])
         if len(failed) < MAX_FAILURES:
             return None
@@ -67,7 +70,7 @@ class Approach:
         return (path, stop_distance) if cut is None else (cut, 0.0)
 
     def _cut(self, path: NDArray[np.float64], goal: Goal, stop_distance: float) -> NDArray[np.float64] | None:
-        """Return the first part of a path, or None if its normal end is suitable or no other place is."""
+        """Return the part of a path up to a suitable place. Return None if the usual place is suitable or none is."""
         middle, suits = _middle(goal), self._house.standing.suits
         arcs = np.append(np.arange(0.0, path_length(path), SPACING), path_length(path))
         points = [np.array(point_along(path, float(arc))) for arc in arcs]
@@ -75,9 +78,9 @@ class Approach:
         first = next((k for k, gap in enumerate(gaps) if gap <= stop_distance), len(points) - 1)
         if suits(points[first], goal):
             return None
-        was_suitable = False  # the person may stop slightly before the end
+        was_suitable = False  # the person may stop just before the end of the path
         for k in range(first + 1, len(points)):
-            is_suitable = gaps[k] >= MIN_STOP_DISTANCE and suits(points[k], goal)
+            is_suitable = MIN_STOP_DISTANCE <= gaps[k] <= stop_distance and suits(points[k], goal)
             if is_suitable and was_suitable:
                 return _first_part(path, float(arcs[k]))
             was_suitable = is_suitable

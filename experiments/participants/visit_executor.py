@@ -82,7 +82,7 @@ class VisitExecutor:
         return FollowPath(self._path_to(percept, goal), goal, stop_distance, until=self._bins.until(until))
 
     def waits(self, percept: Percept) -> bool:
-        """Return True during a pick or place. Call this at every decision, so that lost grips are noticed."""
+        """Return True during a pick or place. Call this at every decision, so that lost grips are recorded."""
         if percept.busy:
             self._approach.record(percept)
         return percept.busy

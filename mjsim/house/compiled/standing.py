@@ -16,7 +16,7 @@ from mjsim.values.person_parameters import PersonParameters
 
 Point = NDArray[np.float64]
 Goal = Point | ReceptacleGeometry
-"""Receptacle, or floor position of an object in metres, shape (2,)."""
+"""A receptacle, or the floor position of an object in metres, shape (2,)."""
 
 REACH_HEIGHT = 1.15  # height at which a hand passes over furniture, in metres
 SHOULDERS, HANDS = 0.15, 0.05  # half widths of a reach at the person and at its end, in metres
@@ -82,7 +82,7 @@ class StandingPlaces:
             ahead = DOORWAY_DEPTH * np.array([-across[1], across[0]])
             if self.rooms.room_at(point + ahead) == self.rooms.room_at(point - ahead):
                 continue
-            for part in np.linspace(-1.0, 1.0, 5):  # walls are thicker than the distance of these parts
+            for part in np.linspace(-1.0, 1.0, 5):  # no wall fits between two of these parts
                 start = (*(point + part * ahead), REACH_HEIGHT)
                 sides = (first_hit(self.model, self.data, start, side)[0] for side in (across, -across))
                 if sum(sides) < DOORWAY_WIDTH:
@@ -104,7 +104,7 @@ class StandingPlaces:
 
     def needs_doorway(self, goal: Goal, stand: Point) -> bool:
         """Return True if all places with a free reach, including `stand`, are in doorways, or if there are none."""
-        places = (stand, *self._navigable_around(goal))
+        places = itertools.chain([stand], self._navigable_around(goal))
         return not any(self.is_free(place, goal) and not self.in_doorway(place) for place in places)
 
     def _navigable_around(self, goal: Goal) -> Iterator[Point]:
