@@ -1,4 +1,7 @@
-"""Measure the quality, cost and variety of many generated homes."""
+"""Measure the quality, cost and variety of many generated homes, and run trials in them.
+
+The part `trials` runs one trial per home with a short person and one with a tall person.
+"""
 
 import itertools
 import json
@@ -15,12 +18,15 @@ from rich.console import Console
 from rich.progress import track
 
 from benchmarks.support.home_figures import WAY, figures, remade
+from benchmarks.support.home_trials import trial_lines, trials
 from benchmarks.support.requirements import outcome
+from experiments.errors import ConfigError
 from mjsim.house.catalogue.generated_names import ROOMS
 from mjsim.support.files import ROOT, digest_of
 
 T = TypeVar("T")
 Rows = Sequence[dict[str, Any]]
+PARTS = ("figures", "trials")
 COUNT, QUICK = 100, 2  # number of homes of each size
 FIRST_SEED = 50_000
 OUT = Path("runs/bench-houses")
@@ -143,6 +149,7 @@ REQUIREMENTS: Mapping[str, tuple[Callable[[Rows], float], str, float]] = {
 
 
 def measure(
+    parts: Sequence[str] = PARTS[:1],
     quick: bool = False,
     count: int | None = None,
     rooms: Sequence[int] = range(ROOMS[0], ROOMS[1] + 1),
@@ -150,18 +157,31 @@ def measure(
     workers: int = 1,
     out: Path = OUT,
 ) -> dict[str, Any]:
-    """Run the benchmark and return a JSON-serializable result.
+    """Run parts of the benchmark and return a JSON-serializable result.
 
     Args:
+        parts: `figures` of the homes, `trials` in them, or both.
         quick: True to generate only two homes of each size.
         count: Number of homes of each size.
         rooms: Numbers of rooms of the homes.
         first_seed: Seed of the first home. The next homes have consecutive seeds.
         workers: Number of processes.
-        out: Cache folder for the results of every home. A changed generator invalidates them.
+        out: Cache folder for the figures of every home. A changed generator invalidates them.
+
+    Raises:
+        ConfigError: There is no such part.
     """
+    if unknown := sorted(set(parts) - set(PARTS)):
+        raise ConfigError(f"benchmark houses has no parts {', '.join(unknown)}; there are {', '.join(PARTS)}")
     each = count or (QUICK if quick else COUNT)
     homes = [(size, first_seed + each * (size - ROOMS[0]) + i) for i in range(each) for size in rooms]
+    result = _figures(homes, workers, out) if "figures" in parts else {}
+    if "trials" in parts:
+        result["trials"] = [row for rows in _in_workers(trials, homes, workers, "trials") for row in rows]
+    return result
+
+
+def _figures(homes: Sequence[tuple[int, int]], workers: int, out: Path) -> dict[str, Any]:
     code = digest_of(*(ROOT / "mjsim" / name for name in ("generator", "house", "formats/gltf")))
     rows = {(row["rooms"], row["seed"]): row for row in _kept(out) if row["code"] == code}
     missing = [home for home in homes if home not in rows]
@@ -214,6 +234,13 @@ def _in_workers(
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
+    if "figures" in result:
+        yield from _figure_lines(result)
+    if "trials" in result:
+        yield from trial_lines(result["trials"])
+
+
+def _figure_lines(result: dict[str, Any]) -> Iterator[str]:
     yield from result["faults"]
     yield "| rooms | " + " | ".join(COLUMNS) + " |"
     yield "|---" * (len(COLUMNS) + 1) + "|"

@@ -1,6 +1,7 @@
 """A loaded house, with its catalogue, navmesh, geodesics, rooms and receptacles."""
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,6 +19,7 @@ from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.footprint import Footprint
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap
+from mjsim.house.compiled.standing import StandingPlaces
 from mjsim.house.scene.disorder import Disorder
 from mjsim.house.scene.sampling import house_points, sample_episode
 from mjsim.house.validation.validate import require_usable
@@ -84,13 +86,14 @@ class House:
         person = PersonParameters()
         navmesh = _navmesh(floor, person.body_radius + WALL_GAP)
         geodesics = Geodesics(navmesh, person.reach)
+        standing = StandingPlaces.of(house, navmesh, person)
         return cls(
             catalogue,
             navmesh,
             navmesh,
             geodesics,
             house.rooms,
-            house.receptacles,
+            {key: _usable(receptacle, standing) for key, receptacle in house.receptacles.items()},
             floor.bounds,
             person,
             HudTexts(**read_words()["hud"]),
@@ -136,6 +139,21 @@ class House:
         """Shortest paths without extra distance from walls, which give lower bounds on walking distances."""
         floor = compiled_house(self.catalogue).floor
         return Geodesics(_navmesh(floor, self.person.body_radius))
+
+    @cached_property
+    def standing(self) -> StandingPlaces:
+        """The places where the person can stand to pick up or place an object."""
+        return StandingPlaces.of(compiled_house(self.catalogue), self.navmesh, self.person)
+
+    def place_of(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the place, in metres, to which a person walks to pick up an object at a point (2,).
+
+        This is the point itself, unless the reach from the nearest navigable place is not free.
+        """
+        if self.navmesh.is_navigable(point):
+            return point
+        place = self.standing.instead_of(self.navmesh.snap(point, math.inf), point)
+        return point if place is None else place
 
     @cached_property
     def approaches(self) -> Mapping[str, NDArray[np.float64]]:
@@ -191,6 +209,12 @@ def read_words(language: str = "en") -> Mapping[str, Mapping[str, Any]]:
 
 def _navmesh(floor: Footprint, radius: float) -> NavMesh:
     return NavMesh.build(floor.obstacles, floor.bounds, agent_radius=radius)
+
+
+def _usable(receptacle: ReceptacleGeometry, standing: StandingPlaces) -> ReceptacleGeometry:
+    """Move the approach of a receptacle if it is in a doorway or the reach is not free."""
+    place = standing.instead_of(standing.navigable.snap(receptacle.approach, math.inf), receptacle)
+    return receptacle if place is None else dataclasses.replace(receptacle, approach=place)
 
 
 def _farthest_points(points: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:

@@ -54,7 +54,7 @@ class Boltzmann:
         self._choice: Visit | None = None
 
     def act(self, percept: Percept) -> Action:
-        if percept.busy:
+        if self._executor.waits(percept):
             return WAIT
         choices = {choice.visit: choice for choice in percept.choices}
         if not choices:

@@ -20,7 +20,7 @@ class BreadcrumbFollower:
 
     def act(self, percept: Percept) -> Action:
         """Return the action for the next control step."""
-        if percept.busy or percept.guidance is None:
+        if self._executor.waits(percept) or percept.guidance is None:
             return WAIT
         return self._executor.follow(percept, percept.guidance)
 

@@ -27,7 +27,7 @@ class Nearest:
 
     def act(self, percept: Percept) -> Action:
         """Return the action for the next control step."""
-        if percept.busy:
+        if self._executor.waits(percept):
             return WAIT
         self._look(percept)
         if not self._known and not percept.carried and self._turn is None:

@@ -33,7 +33,7 @@ class Searcher:
         self._choice: Visit | None = None
 
     def act(self, percept: Percept) -> Action:
-        if percept.busy:
+        if self._executor.waits(percept):
             return WAIT
         self._look(percept)
         visit = self._next_visit(percept)

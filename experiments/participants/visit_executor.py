@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
+from experiments.participants.approach import MIN_STOP_DISTANCE, Approach
 from experiments.participants.base import NEARBY, FullTurn, Guidance, Percept, Point, estimated_distances
 from mjsim.values.actions import TIME_TOLERANCE, WAIT, Action, FollowPath, Pick, Place
 from mjsim.world.walking.polyline import project
@@ -13,7 +14,6 @@ from planner.plan import Visit, VisitKind
 
 STOP_SHARE = 0.72  # stopping distance relative to the reach, large enough not to kick the object
 CLOSER = 0.12  # reduction of the stopping distance after a refused pick or place, in metres
-MIN_STOP_DISTANCE = 0.30  # minimum distance between the person and the goal at the end of a walk, in metres
 ARRIVED = 0.5  # distance from a viewpoint at which the participant starts to look around, in metres
 
 WalkTo = Callable[[Percept, Point, float], Action]
@@ -22,14 +22,15 @@ WalkTo = Callable[[Percept, Point, float], Action]
 class VisitExecutor:
     """An executor that carries out visits for a participant.
 
-    After a refused pick or place, the participant stops closer to the goal. A blocked participant takes
-    another path. If the participant has not seen the bin of a visit yet, the visit begins with a search for
-    the bin.
+    The walk ends where the straight reach to the goal is free. After a refused pick or place, the participant
+    stops closer to the goal, and after two lost grips, elsewhere. A blocked participant takes another path. If
+    the participant has not seen the bin of a visit yet, the visit begins with a search for the bin.
     """
 
     def __init__(self, house: House) -> None:
         self._house = house
         self._bins = BinSearch(house)
+        self._approach = Approach(house)
         self._visit: Visit | None = None
         self._stop_distance = MIN_STOP_DISTANCE
         self._read_until = 0.0
@@ -43,7 +44,7 @@ class VisitExecutor:
 
         `objects` contains remembered positions. `until` is the time of the next decision in seconds.
         """
-        if percept.busy:
+        if self.waits(percept):
             return WAIT
         self.look_for_bins(percept)
         self._take_up(percept, visit)
@@ -52,21 +53,23 @@ class VisitExecutor:
         if not self._knows(percept, visit):
             return self._bins.act(percept, percept.targets[visit.object], self.walk_to)
         goal, stand = self._find_places(percept, visit, objects)
-        path = self._path_to(percept, stand)
-        return FollowPath(path, goal, self._stop_distance, _action(visit), self._bins.until(until))
+        path, stop_distance = self._walk(percept, visit, goal, lambda: self._path_to(percept, stand))
+        return FollowPath(path, goal, stop_distance, _action(visit), self._bins.until(until))
 
     def follow(self, percept: Percept, guidance: Guidance, *, until: float | None = None) -> Action:
         """Walk along the shown path, then pick or place. `until` is the next decision time in seconds."""
-        if percept.busy:
+        if self.waits(percept):
             return WAIT
         self._take_up(percept, guidance.visit)
         if self._is_reading(percept):
             return WAIT
+        visit, goal = guidance.visit, guidance.goal
+        path, stop_distance = self._walk(percept, visit, goal, lambda: guidance.path)
         return FollowPath(
-            guidance.path,
-            guidance.goal,
-            self._stop_distance,
-            _action(guidance.visit),
+            path,
+            goal,
+            stop_distance,
+            _action(visit),
             until,
             shown=True,
             tolerance=guidance.tolerance,
@@ -77,6 +80,12 @@ class VisitExecutor:
     ) -> Action:
         """Walk the shortest known path to within `stop_distance` of a point, both in metres."""
         return FollowPath(self._path_to(percept, goal), goal, stop_distance, until=self._bins.until(until))
+
+    def waits(self, percept: Percept) -> bool:
+        """Return True during a pick or place. Call this at every decision, so that lost grips are recorded."""
+        if percept.busy:
+            self._approach.record(percept)
+        return percept.busy
 
     def look_for_bins(self, percept: Percept) -> None:
         """Remember the bins in view. Call this each time the participant looks around."""
@@ -116,6 +125,17 @@ class VisitExecutor:
             )
         return path
 
+    def _walk(
+        self, percept: Percept, visit: Visit, at: Point, path_to: Callable[[], NDArray[np.float64]]
+    ) -> tuple[NDArray[np.float64], float]:
+        """Return the path and the stopping distance of a walk. `path_to` returns the usual path to a goal `at`."""
+        is_pick = visit.kind is VisitKind.PICK
+        goal = at if is_pick else self._house.receptacles[percept.targets[visit.object]]
+        place = self._approach.elsewhere(percept, visit, goal)
+        if place is not None:
+            return self._path_to(percept, place), 0.0
+        return self._approach.end(path_to(), goal, self._stop_distance)
+
     def _find_places(
         self, percept: Percept, visit: Visit, objects: Mapping[str, Point]
     ) -> tuple[Point, Point]:
@@ -133,7 +153,7 @@ def places(house: House, percept: Percept, visit: Visit, objects: Mapping[str, P
     """Return the goal of a visit and the end of the path to the goal, both in metres, shape (2,)."""
     if visit.kind is VisitKind.PICK:
         goal = objects[visit.object]
-        return goal, house.navmesh.snap(goal)
+        return goal, house.navmesh.snap(house.place_of(goal))
     receptacle = percept.targets[visit.object]
     return house.receptacles[receptacle].center[:2], house.approaches[receptacle]
 

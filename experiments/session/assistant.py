@@ -174,7 +174,9 @@ class Assistant:
         loose = observation.names_with(ObjectStatus.LOOSE)
         return TaskState(
             position=_xy(observation.position),
-            loose={name: _xy(position) for name, position in positions if name in loose},
+            loose={
+                name: _xy(self._house.place_of(position[:2])) for name, position in positions if name in loose
+            },
             carried=observation.carried,
             deliveries=self._deliveries,
         )
@@ -209,7 +211,7 @@ class Assistant:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         goal = self._goal(observation, visit)
         if visit.kind is VisitKind.PICK:
-            return goal, goal
+            return self._house.place_of(goal), goal
         return self._house.receptacles[self._episode.targets[visit.object]].approach[:2], goal
 
 

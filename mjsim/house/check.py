@@ -10,6 +10,7 @@ from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.house_ref import CATALOGUE
 from mjsim.house.catalogue.model_files import elements
 from mjsim.house.compiled.house import CompiledHouse, compiled_house
+from mjsim.house.compiled.standing import StandingPlaces
 from mjsim.house.scene.episode_rules import check_fit, check_overlaps, check_poses, check_reach
 from mjsim.house.scene.sampling import points_that_fit, sample_episode
 from mjsim.house.scene.scene import assemble
@@ -21,6 +22,7 @@ from mjsim.house.validation.validate import check_house, require_usable
 from mjsim.house.validation.views import Drawing, floor_view, side_views
 from mjsim.values.episode import POINTS, Episode
 from mjsim.values.errors import AssetError, EpisodeError, PhysicsError, SamplingError
+from mjsim.values.person_parameters import PersonParameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +137,7 @@ def check_episode_file(path: Path, house: str | None = None, load: Load = Catalo
     if not errors(found):
         scene = assemble(episode, catalogue)
         found += check_overlaps(episode, scene.model, scene.index.geom_owner)
-        found += check_reach(episode, built.navigable)
+        found += check_reach(episode, StandingPlaces.of(built, built.navigable, PersonParameters()))
     facts = {"house": catalogue.name, "objects": str(len(episode.objects)), "seed": str(episode.seed)}
     return CheckReport("episode", str(path), tuple(found), facts, (view,))
 

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks import _command, growth, houses, play
 from benchmarks._command import benchmark, benchmark_names
-from benchmarks.support import home_figures, play_load
+from benchmarks.support import home_figures, home_trials, play_load
 from benchmarks.support.play_browser import SeenFrame, SimulatedBrowser
 from benchmarks.support.play_load import median_width
 from experiments.cli.main import main
@@ -120,3 +120,24 @@ def test_grown_records_are_the_trials_of_their_design(tmp_path, capsys):
     assert {row["task_distance_m"] for row in rows} == {row["task_distance_m"] for row in real}
     with pytest.raises(ConfigError, match="there are resume, analyze, collect"):
         growth.measure(parts=("speed",))
+
+
+def test_trials_in_homes_fail_with_two_lost_grips_an_object_left_or_a_deep_penetration():
+    good = {"home": "generated:1", "person": "tall", "finished": True, "time_s": 90.0, "lost": 1}
+    good |= {"penetration_mm": 4.0}
+    assert not [line for line in home_trials.trial_lines([good]) if "FAIL" in line]
+    for worse in ({"finished": False}, {"lost": 2}, {"penetration_mm": 10.1}):
+        said = list(home_trials.trial_lines([good, good | worse]))
+        assert sum("FAIL" in line for line in said) == 1 and "generated:1, tall" in said[1]
+
+
+def test_unknown_parts_of_the_homes_benchmark_are_named():
+    with pytest.raises(ConfigError, match="no parts walks; there are figures, trials"):
+        houses.measure(parts=["walks"])
+
+
+@pytest.mark.slow
+def test_two_people_tidy_a_generated_home():
+    rows = home_trials.trials((3, 940_100))
+    assert [(row["person"], row["finished"]) for row in rows] == [("short", True), ("tall", True)]
+    assert all(row["lost"] <= 1 and 0.0 < row["penetration_mm"] < 10.0 for row in rows)

@@ -73,7 +73,7 @@ class Guest:
         self._next_look = self._thinks_until = 0.0
 
     def act(self, percept: Percept) -> Action:
-        if percept.busy:
+        if self._executor.waits(percept):
             return WAIT
         self._begin(percept)
         if self._thinks(percept):  # a thinking guest looks at the HUD, not at the room

@@ -143,6 +143,12 @@ class ReceptacleGeometry:
         outside = np.maximum(np.abs(local) - self.half_size, 0.0)
         return float(np.hypot(outside[0], outside[1]))
 
+    def nearest(self, xy: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.float64]:
+        """Return the point (2,) nearest to `xy` that is at most `margin` metres away from the volume's sides."""
+        local = self.rotation.T @ np.array([*(xy - self.center[:2]), 0.0])
+        inside = np.clip(local, -self.half_size - margin, self.half_size + margin)
+        return np.asarray((self.center + self.rotation @ inside)[:2])
+
 
 def receptacle_geometries(model: mujoco.MjModel, keys: Iterable[str]) -> dict[str, ReceptacleGeometry]:
     """Read the geometry of receptacles from the sites `<key>/volume` and `<key>/approach` of a model."""

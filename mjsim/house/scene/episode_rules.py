@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.compiled.house import NavigablePoints
 from mjsim.house.compiled.sites import RoomMap
+from mjsim.house.compiled.standing import StandingPlaces
 from mjsim.house.scene.avatar import PREFIX, TRUNK
 from mjsim.house.validation.findings import Finding
 from mjsim.values.episode import Episode, PlacedObject
@@ -155,8 +155,9 @@ def check_overlaps(episode: Episode, model: mujoco.MjModel, owner: NDArray[np.in
             )
 
 
-def check_reach(episode: Episode, navigable: NavigablePoints) -> Iterator[Finding]:
+def check_reach(episode: Episode, standing: StandingPlaces) -> Iterator[Finding]:
     """Check that a person can stand at the start position and can reach every object."""
+    navigable = standing.navigable
     places = [("start", (episode.start.x, episode.start.y), 0.25)]
     places += [(o.name, o.position[:2], REACH) for o in episode.objects]
     for subject, xy, limit in places:
@@ -168,6 +169,17 @@ def check_reach(episode: Episode, navigable: NavigablePoints) -> Iterator[Findin
                 f"at ({xy[0]:.2f}, {xy[1]:.2f}) is {gap:.2f} m from where a person can walk",
                 f"move it to at most {limit} m",
                 place=(*xy, 0.0),
+            )
+    for placed in episode.objects:
+        at = np.array(placed.position[:2])
+        if standing.needs_doorway(at, navigable.snap(at, np.inf)):
+            yield Finding(
+                "reach",
+                placed.name,
+                f"at ({at[0]:.2f}, {at[1]:.2f}) cannot be reached in a straight line, except perhaps from a doorway",
+                "move it away from walls and doorways",
+                "warning",
+                place=(*at, 0.0),
             )
 
 

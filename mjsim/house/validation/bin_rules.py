@@ -112,6 +112,13 @@ def _bin_use(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[F
             "remove what is in between, or turn its mount so that local -y faces free floor",
             (*stand, 0.0),
         )
+    elif floor.standing.needs_doorway(receptacle, stand):
+        yield subject.warning(
+            "reach",
+            "cannot be reached in a straight line, except perhaps from a doorway",
+            "leave free floor next to it, away from doorways",
+            receptacle.center,
+        )
 
 
 def _for_receptacle(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Compiled:

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from mjsim.house.compiled.footprint import ClearanceField
 from mjsim.house.compiled.house import NavigableFloor
 from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap
+from mjsim.house.compiled.standing import StandingPlaces
 from mjsim.house.validation.checked_model import Compiled
+from mjsim.values.person_parameters import PersonParameters
 
 BODY_BAND = (0.05, 1.8)  # range of heights in which geoms obstruct a person, in metres
 BORDER = 1.0  # margin of the grids around the rooms, in metres
@@ -27,6 +29,12 @@ class WalkableFloor:
     receptacles: dict[str, ReceptacleGeometry]
     rooms_of: dict[str, str]  # receptacle key -> key of its room in the catalogue
     navigable: NavigableFloor
+
+    @cached_property
+    def standing(self) -> StandingPlaces:
+        """The places where the default person can stand."""
+        model, data = self.compiled.model, self.compiled.data
+        return StandingPlaces(model, data, self.rooms, self.navigable, PersonParameters())
 
     @cached_property
     def walkable(self) -> tuple[NDArray[np.float64], float]:
