@@ -36,6 +36,7 @@ from mjsim.house.validation.findings import Finding, errors
 from mjsim.importing.house.bins import place_bins
 from mjsim.importing.house.drawn_meshes import make_drawn_meshes
 from mjsim.importing.house.floor_grid import FloorGrid, make_floor_grid, too_large
+from mjsim.importing.house.plausibility import doubts
 from mjsim.importing.house.rooms import find_rooms, read_rooms
 from mjsim.importing.house.solids import HIGH, LOW, Solids, make_solids
 from mjsim.importing.house.storey import FAR, counted, floor_and_ceiling, near_pieces, of_one_storey
@@ -79,6 +80,7 @@ def import_house(
         if found := errors(report.findings):
             raise AssetError(f"{source}: {_refusal(found)}")
         fits = int(report.facts["points that fit"].split()[0])
+        unusual = tuple(doubts(house.grid, fits))
         if fits < POINTS:  # Use fewer points than fit, because other random samples may leave larger gaps.
             points = max(fits - 2, 1)
             set_points(path, points)
@@ -93,7 +95,7 @@ def import_house(
         if out.exists():
             out.rename(work / "old")
         new.rename(out)
-    return tuple(decisions), report
+    return tuple(decisions), replace(report, findings=(*report.findings, *unusual))
 
 
 def _without(scene: SourceScene) -> str:
