@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from mjsim.formats.scene.mesh_files import MAX_TRIANGLES, PLAIN, primitive, read_parts
+from mjsim.formats.scene.mesh_colours import PLAIN
+from mjsim.formats.scene.mesh_files import MAX_TRIANGLES, MeshPart, primitive, read_parts
 from mjsim.formats.scene.source_scene import (
     HouseOptions,
     ImportDecision,
@@ -75,7 +76,7 @@ class _WorldReader:
         self.missing = MissingFiles(options.skip_missing)
         self._unknown: dict[str, int] = {}
         self._count = 0  # number of models that have been read
-        self._meshes: dict[Path, list[tuple[str, Surface]]] = {}
+        self._meshes: dict[Path, list[MeshPart]] = {}
 
     def unknown_kinds(self) -> tuple[ImportDecision, ...]:
         return tuple(
@@ -170,7 +171,7 @@ class _WorldReader:
                 self.missing.files.append(file.name)
         own = numbers((shape.findtext("scale") or "1 1 1").split(), 3, self._path)
         scale = at.state.shape_scale("mesh", own)
-        yield from (s.moved(frame @ np.diag([*scale, 1.0])) for _, s in self._meshes[file])
+        yield from (p.surface.moved(frame @ np.diag([*scale, 1.0])) for p in self._meshes[file])
 
     def _find(self, uri: str, folder: Path | None) -> Path | None:
         """Return the file or folder that a URI names, or None if it is missing and may be skipped."""

@@ -11,14 +11,14 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from trimesh.resolvers import FilePathResolver
 from trimesh.transformations import rotation_matrix, scale_matrix
 
+from mjsim.formats.scene.mesh_colours import is_opaque, surface_of
 from mjsim.formats.scene.source_scene import TEXTURE_SIDE
 from mjsim.formats.scene.surface import Floats, Surface, joined
 from mjsim.support.files import check_input, read_bytes
@@ -27,10 +27,10 @@ from mjsim.values.errors import AssetError
 OBJECT_SUFFIXES = (".glb", ".obj", ".stl", ".ply")
 MAX_FILE = 500_000_000  # maximum file size in bytes
 MAX_TRIANGLES = 5_000_000
-PLAIN = (0.74, 0.72, 0.68)  # RGB colour of meshes without a colour
 SCENE_SUFFIXES = (".glb", ".gltf", ".dae", ".obj", ".stl", ".ply")
 GLTF = (".glb", ".gltf")
 Y_TO_Z = rotation_matrix(np.pi / 2, [1, 0, 0])
+LOOSE = "mjsim_loose"  # key in the extras of a glTF mesh that marks a movable object
 
 
 class Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
@@ -118,59 +118,6 @@ def _named(path: Path, keyword: str) -> list[str]:
         return [found[-1] for found in words if len(found) > 1]
 
 
-def surface_of(mesh: trimesh.Trimesh, *, linear: bool, side: int | None = None) -> Surface:
-    """Convert a trimesh mesh to a surface.
-
-    Args:
-        mesh: The mesh to convert.
-        linear: True if plain colours are linear, as in glTF.
-        side: Maximum side length of the image in pixels. Larger images are reduced. None keeps the image
-            unchanged.
-    """
-    count = len(mesh.faces)
-    corners = np.asarray(mesh.triangles, np.float64)
-    colours, uv = np.ones((count, 3, 3)), np.zeros((count, 3, 2))
-    colours[:] = PLAIN
-    picture = None
-    visual = mesh.visual
-    if visual.kind == "texture":
-        colours[:], picture = _material(visual.material, side)
-        if visual.uv is None or len(visual.uv) != len(mesh.vertices):
-            picture = None
-        else:
-            uv = np.asarray(visual.uv, np.float64)[mesh.faces]
-    elif visual.kind == "vertex":
-        colours = np.asarray(visual.vertex_colors, np.float64)[mesh.faces][..., :3] / 255
-    elif visual.kind == "face":
-        colours = np.repeat(np.asarray(visual.face_colors, np.float64)[:, None, :3] / 255, 3, axis=1)
-    if linear and visual.kind is not None:
-        colours = _srgb(colours)
-    uv = np.nan_to_num(uv, nan=0.0, posinf=0.0, neginf=0.0)
-    number = np.full(count, -1 if picture is None else 0)
-    return Surface(corners, colours, uv, number, () if picture is None else (picture,))
-
-
-def _material(material: Any, side: int | None) -> tuple[Floats, NDArray[np.float64] | None]:
-    """Return a material's plain colour (3,) and its image (height, width, 3), as RGB values from 0 to 1."""
-    if isinstance(material, trimesh.visual.material.PBRMaterial):
-        factor, picture = material.baseColorFactor, material.baseColorTexture
-    else:
-        factor, picture = getattr(material, "diffuse", None), getattr(material, "image", None)
-    if picture is not None and side is not None:
-        picture = picture.copy()
-        picture.thumbnail((side, side))
-    pixels = None if picture is None else np.asarray(picture.convert("RGB"), np.float64) / 255
-    if factor is None:
-        return np.ones(3) if pixels is not None else np.array(PLAIN), pixels
-    return np.asarray(factor, np.float64)[:3] / 255, pixels
-
-
-def _srgb(linear: Floats) -> Floats:
-    """Convert linear colours to sRGB (IEC 61966-2-1)."""
-    low, high = 12.92 * linear, 1.055 * np.clip(linear, 0.0, 1.0) ** (1 / 2.4) - 0.055
-    return np.where(linear <= 0.0031308, low, high)
-
-
 class _Nearby(Beside):
     """A resolver for files in the mesh's folder or a sibling folder, such as `../textures/wood.png`."""
 
@@ -188,8 +135,17 @@ class _Nearby(Beside):
         return path
 
 
-def read_parts(path: Path, transform: Floats | None = None) -> list[tuple[str, Surface]]:
-    """Read the parts of a mesh file with their node names, and apply a transform (4, 4) to them.
+class MeshPart(NamedTuple):
+    """A part of a mesh file with a single material."""
+
+    name: str  # name of the node that contains the part
+    surface: Surface
+    seen: bool = True  # False for a translucent part, such as a painted shadow or a pane
+    loose: bool = False  # True if the file marks the part as movable
+
+
+def read_parts(path: Path, transform: Floats | None = None) -> list[MeshPart]:
+    """Read the parts of a mesh file, and apply a transform (4, 4) to them.
 
     Parts of glTF and COLLADA files are converted to metres with z up. Other formats keep their unit and axes.
 
@@ -208,19 +164,33 @@ def read_parts(path: Path, transform: Floats | None = None) -> list[tuple[str, S
         scene = trimesh.load_scene(source, file_type=suffix[1:], process=False, resolver=_Nearby(path))
         known: dict[str, Surface] = {}
         parts = []
-        for node in sorted(scene.graph.nodes_geometry):
-            place, key = scene.graph[node]
+        for name, key, node in sorted(_nodes(scene)):
             mesh = scene.geometry[key]
             if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
                 continue
             if key not in known:
                 known[key] = surface_of(mesh, linear=suffix in GLTF, side=TEXTURE_SIDE)
-            parts.append((str(node), known[key].moved(whole @ place)))
+            surface = known[key].moved(whole @ scene.graph[node][0])
+            loose = mesh.metadata.get(LOOSE) is True
+            parts.append(MeshPart(name, surface, is_opaque(mesh), loose))
     if not parts:
         raise AssetError(f"{path} has no triangles; export it as a mesh of triangles")
-    if (count := sum(len(surface) for _, surface in parts)) > MAX_TRIANGLES:
+    if (count := sum(len(part.surface) for part in parts)) > MAX_TRIANGLES:
         raise AssetError(f"{path} has {count} triangles; reduce it to {MAX_TRIANGLES} or fewer")
     return parts
+
+
+def _nodes(scene: trimesh.Scene) -> Iterator[tuple[str, str, str]]:
+    """Yield a name, the key of the geometry, and the node for each geometry of a scene.
+
+    For a glTF mesh with several materials, trimesh creates child nodes with random names. Their name is that of the
+    parent node.
+    """
+    parents = scene.graph.transforms.parents
+    for node in scene.graph.nodes_geometry:
+        key = scene.graph[node][1]
+        shared = scene.geometry[key].metadata.get("from_gltf_primitive")
+        yield str(parents[node] if shared else node), str(key), str(node)
 
 
 def primitive(mesh: trimesh.Trimesh, colour: Floats) -> Surface:

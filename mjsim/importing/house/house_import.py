@@ -33,7 +33,7 @@ from mjsim.formats.sdf import read_sdf
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.check import CheckReport, check_house_name
 from mjsim.house.validation.findings import Finding, errors
-from mjsim.importing.house.bins import place_bins
+from mjsim.importing.house.bins import place_bins, without_bins
 from mjsim.importing.house.drawn_meshes import make_drawn_meshes
 from mjsim.importing.house.floor_grid import FloorGrid, make_floor_grid, too_large
 from mjsim.importing.house.plausibility import doubts
@@ -145,6 +145,9 @@ def _converted(
         ),
     ]
     decisions += [*scene.notes, *far]
+    catalogue = Catalogue.load()
+    given_bins = tuple(replace(b, z=b.z - level) for b in scene.bins)
+    pieces = without_bins(pieces, [b for b in given_bins if b.key in catalogue.receptacles], catalogue)
     pieces, notes = of_one_storey(pieces, ceiling - level)
     decisions += notes
     _check_span(pieces)
@@ -171,8 +174,6 @@ def _converted(
     drawn = [piece for piece in pieces if piece.name not in opened]
     given = read_rooms(options.rooms) if options.rooms is not None else scene.rooms
     rooms = find_rooms(grid, given, drawn)
-    catalogue = Catalogue.load()
-    given_bins = tuple(replace(b, z=b.z - level) for b in scene.bins)
     kept_bins = all(b.key in catalogue.receptacles and b.room in dict(rooms.names) for b in given_bins)
     bins = given_bins if given_bins and kept_bins else place_bins(grid, rooms, catalogue)
     if lost := [room.label for room in given if room.key not in dict(rooms.names)]:
