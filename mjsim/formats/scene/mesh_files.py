@@ -30,25 +30,43 @@ MAX_TRIANGLES = 5_000_000
 SCENE_SUFFIXES = (".glb", ".gltf", ".dae", ".obj", ".stl", ".ply")
 GLTF = (".glb", ".gltf")
 Y_TO_Z = rotation_matrix(np.pi / 2, [1, 0, 0])
+_TEXTURES = ("materials/textures", "textures", "materials/scripts")  # folders next to a mesh's folder
 LOOSE = "mjsim_loose"  # key in the extras of a glTF mesh that marks a movable object
 
 
-class Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
-    """A resolver for files that a mesh file refers to, such as materials."""
+class Nearby(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
+    """A resolver for files to which a mesh file refers, such as materials and textures."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__(file)
+        self._file = file
 
     def absolute(self, name: str) -> Path:
         """Return the path of a referenced file. Raise `OSError` for pipes, devices and oversized files."""
-        path = Path(super().absolute(name))
+        path, root = referenced(self._file, name), self._file.parent.resolve().parent
+        if not path.is_relative_to(root):
+            raise ValueError(f"{name!r} is outside of {root}")
         if path.exists():
             check_input(path)
         return path
+
+
+def referenced(file: Path, name: str) -> Path:
+    """Return the path of a file to which a mesh file refers.
+
+    If it is not there, look for it in the folders in which Gazebo models keep their textures.
+    """
+    folder = file.parent.resolve()
+    others = (folder.parent / place / Path(name).name for place in _TEXTURES)
+    path = (folder / name).resolve()
+    return path if path.exists() else next((other for other in others if other.exists()), path)
 
 
 def read_surface(path: Path) -> Surface:
     """Read all triangles of a mesh file in its own unit and axes. Raise `AssetError` if there are none."""
     check_mesh_file(path)
     with parsing(path):
-        geometries = trimesh.load_scene(path, process=False, resolver=Beside(path)).dump()
+        geometries = trimesh.load_scene(path, process=False, resolver=Nearby(path)).dump()
     meshes = [g for g in geometries if isinstance(g, trimesh.Trimesh) and len(g.faces)]
     if not meshes:
         raise AssetError(f"{path} {_what_it_has(geometries)}; export it as a mesh of triangles")
@@ -64,7 +82,7 @@ def missing_colours(path: Path) -> tuple[str, ...]:
         return ()
     named = _named(path, "mtllib")
     pictures = [picture for name in named for picture in _named(path.parent / name, "map_Kd")]
-    return tuple(name for name in dict.fromkeys([*named, *pictures]) if not (path.parent / name).is_file())
+    return tuple(name for name in dict.fromkeys([*named, *pictures]) if not referenced(path, name).is_file())
 
 
 def check_mesh_file(path: Path, suffixes: tuple[str, ...] = OBJECT_SUFFIXES) -> None:
@@ -118,23 +136,6 @@ def _named(path: Path, keyword: str) -> list[str]:
         return [found[-1] for found in words if len(found) > 1]
 
 
-class _Nearby(Beside):
-    """A resolver for files in the mesh's folder or a sibling folder, such as `../textures/wood.png`."""
-
-    def __init__(self, file: Path) -> None:
-        super().__init__(file)
-        self._file = file
-
-    def absolute(self, name: str) -> Path:
-        folder = self._file.parent.resolve()
-        path = (folder / name).resolve()
-        if not path.is_relative_to(folder.parent):
-            raise ValueError(f"{name!r} is outside of {folder.parent}")
-        if path.exists():
-            check_input(path)
-        return path
-
-
 class MeshPart(NamedTuple):
     """A part of a mesh file with a single material."""
 
@@ -161,7 +162,7 @@ def read_parts(path: Path, transform: Floats | None = None) -> list[MeshPart]:
         whole = whole @ _collada_frame(path)
     with parsing(path):
         source = _without_comments(path) if suffix == ".dae" else path
-        scene = trimesh.load_scene(source, file_type=suffix[1:], process=False, resolver=_Nearby(path))
+        scene = trimesh.load_scene(source, file_type=suffix[1:], process=False, resolver=Nearby(path))
         known: dict[str, Surface] = {}
         parts = []
         for name, key, node in sorted(_nodes(scene)):
