@@ -53,11 +53,13 @@ def main(folder: Path) -> None:
     found = read_toml(SCENES)
     folders = [folder / repository.replace("/", "+") for repository in found["commits"]]
     models = tuple(path for one in folders for path in (one / "models", one) if path.is_dir())
-    print(_HEAD)
+    sys.stdout.write(f"{_HEAD}\n")
     for repository, scenes in found["scenes"].items():
         for scene in scenes:
             source = folder / repository.replace("/", "+") / scene
-            print(scene_row(f"{repository.partition('/')[2]}/{Path(scene).name}", source, models), flush=True)
+            name = f"{repository.partition('/')[2]}/{Path(scene).name}"
+            sys.stdout.write(f"{scene_row(name, source, models)}\n")
+            sys.stdout.flush()
 
 
 def scene_row(name: str, source: Path, models: tuple[Path, ...]) -> SceneRow:
@@ -83,6 +85,7 @@ def distances(source: Path, options: HouseOptions) -> Iterator[float]:
     """Yield the largest distance between the imported and the expected points of each model, in metres.
 
     The expected points are those of the model at the origin, moved to the pose that the source gives to the model.
+    Models that the source scales are left out.
     """
     root = ET.fromstring(re.sub(r"<\?xml[^>]*\?>", "", read_text(source), count=1))
     world = root.find("world")
@@ -90,6 +93,9 @@ def distances(source: Path, options: HouseOptions) -> Iterator[float]:
     poses = dict(_poses(world))
     for state in world.findall("state"):
         poses |= dict(_poses(state))
+        for model in state.findall("model"):
+            if set((model.findtext("scale") or "1").split()) != {"1"}:
+                del poses[model.get("name", "")]
         world.remove(state)
     for model in (*world.findall("model"), *world.findall("include")):
         for pose in model.findall("pose"):
@@ -116,7 +122,7 @@ def _poses(parent: ET.Element) -> Iterator[tuple[str, Floats]]:
 
 
 def _points(source: Path, options: HouseOptions) -> dict[str, Floats]:
-    """Return the centres of the triangles of each model, shape (n, 3). Triangles would differ after scaling."""
+    """Return the centres of the triangles of each model, shape (n, 3)."""
     found: dict[str, list[Floats]] = {}
     for piece in read_sdf(source, options).pieces:
         found.setdefault(piece.name, []).append(piece.surface.corners.mean(axis=1))
