@@ -26,7 +26,7 @@ _DRAWN = 10.0  # additional weight of cells in which the source draws a floor
 _LEAST_SHARE = 0.15  # minimum share of the floor that outer walls must enclose
 _MIN_AREA = 3.0  # minimum area enclosed by the walls of a house, in square metres
 # Floor around the obstacles that belongs to a house without walls, in metres. Ground planes extend farther.
-_AROUND = 1.0
+_AROUND = 2.5
 
 Mask = NDArray[np.bool_]
 

@@ -26,7 +26,9 @@ def bounds(tmp_path, content, state="", **options):
     points = {}
     for piece in read_sdf(path, HouseOptions(**options)).pieces:
         points.setdefault(piece.name, []).append(piece.surface.corners.reshape(-1, 3))
-    return {name: (np.concatenate(p).min(axis=0), np.concatenate(p).max(axis=0)) for name, p in points.items()}
+    return {
+        name: (np.concatenate(p).min(axis=0), np.concatenate(p).max(axis=0)) for name, p in points.items()
+    }
 
 
 def middle(found, name):
@@ -66,7 +68,9 @@ def test_the_state_of_a_nested_model_counts(tmp_path, state):
 
 
 def test_the_saved_scale_multiplies_boxes_and_keeps_cylinders_round(tmp_path):
-    round_link = "<link name='l'><visual name='v'><geometry><cylinder><radius>1</radius><length>1</length></cylinder>"
+    round_link = (
+        "<link name='l'><visual name='v'><geometry><cylinder><radius>1</radius><length>1</length></cylinder>"
+    )
     round_link += "</geometry></visual></link>"
     state = "".join(f"<model name='{name}'><scale>2 1 0.5</scale></model>" for name in "ab")
     found = bounds(tmp_path, model("a") + model("b", round_link), state)
@@ -84,7 +88,9 @@ def test_the_saved_scale_replaces_that_of_a_mesh(tmp_path):
 
 
 def test_inserted_models_are_added_and_deleted_ones_removed(tmp_path):
-    state = f"<insertions>{model('new', pose='3 0 0 0 0 0')}</insertions><deletions><name>old</name></deletions>"
+    state = (
+        f"<insertions>{model('new', pose='3 0 0 0 0 0')}</insertions><deletions><name>old</name></deletions>"
+    )
     state += "<model name='new'><pose>4 0 0 0 0 0</pose></model>"
     found = bounds(tmp_path, model("old") + model("kept"), state)
     assert set(found) == {"kept", "new"}
@@ -110,10 +116,14 @@ def test_a_file_of_the_authors_machine_is_looked_up_below_the_models(tmp_path):
     folder.mkdir(parents=True)
     trimesh.creation.box((1, 1, 1)).export(folder / "chair.stl")
     uri = "file:///home/somebody/.gazebo/models/chair/meshes/chair.stl"
-    link = f"<link name='l'><visual name='v'><geometry><mesh><uri>{uri}</uri></mesh></geometry></visual></link>"
+    link = (
+        f"<link name='l'><visual name='v'><geometry><mesh><uri>{uri}</uri></mesh></geometry></visual></link>"
+    )
     found = bounds(tmp_path, model("a", link), models=(tmp_path / "elsewhere",))
     np.testing.assert_allclose(np.ptp(found["a"], axis=0), (1, 1, 1))
-    (folder / "chair.stl").rename(tmp_path / "elsewhere" / "chair.stl")  # a file name alone may be another file
+    (folder / "chair.stl").rename(
+        tmp_path / "elsewhere" / "chair.stl"
+    )  # a file name alone may be another file
     with pytest.raises(AssetError, match="which is not there"):
         bounds(tmp_path, model("a", link), models=(tmp_path / "elsewhere",))
 
@@ -121,9 +131,7 @@ def test_a_file_of_the_authors_machine_is_looked_up_below_the_models(tmp_path):
 def test_a_model_that_includes_itself_twice_is_refused_at_once(tmp_path):
     (tmp_path / "twin").mkdir()
     include = "<include><uri>model://twin</uri></include>"
-    (tmp_path / "twin" / "model.sdf").write_text(
-        f"<sdf version='1.6'>{model('t', LINK + 2 * include)}</sdf>"
-    )
+    (tmp_path / "twin" / "model.sdf").write_text(f"<sdf version='1.6'>{model('t', LINK + 2 * include)}</sdf>")
     with pytest.raises(AssetError, match="does one include itself"):
         bounds(tmp_path, include)
 
