@@ -36,8 +36,8 @@ class SceneRow:
     """The result of importing a scene."""
 
     name: str
-    in_place: int  # number of models that are where the source places them
-    models: int  # number of models in the source
+    in_place: int = 0  # number of models that are where the source places them
+    models: int = 0  # number of models in the source, or 0 if the scene is refused
     outline: str = ""
     size: str = ""
     rooms: str = ""
@@ -46,7 +46,8 @@ class SceneRow:
 
     def __str__(self) -> str:
         cells = (self.outline, self.size, self.rooms, self.places, self.fault or "**usable**")
-        return f"| {self.name} | {self.in_place} of {self.models} | {' | '.join(cells)} |"
+        places = f"{self.in_place} of {self.models}" if self.models else ""
+        return f"| {self.name} | {places} | {' | '.join(cells)} |"
 
 
 def main(folder: Path) -> None:
@@ -65,14 +66,13 @@ def main(folder: Path) -> None:
 def scene_row(name: str, source: Path, models: tuple[Path, ...]) -> SceneRow:
     """Import a scene into a temporary folder."""
     options = HouseOptions(models=models, skip_missing=True)
-    in_place = count = 0
     try:
-        near = list(distances(source, options))
-        count, in_place = len(near), sum(distance <= _CLOSE for distance in near)
         with tempfile.TemporaryDirectory() as folder:
             decisions, report = import_house(source, Path(folder) / "house", options)
     except AssetError as error:
-        return SceneRow(name, in_place, count, fault=f"refused: {brief(str(error).rpartition(': ')[2])}")
+        return SceneRow(name, fault=f"refused: {brief(str(error).rpartition(': ')[2])}")
+    near = [distance <= _CLOSE for distance in distances(source, options)]
+    in_place, count = sum(near), len(near)
     outline = next(decision.choice for decision in decisions if decision.what == "outline")
     points = next((d.reason.split()[0] for d in decisions if d.what == "points"), "40 or more")
     size, rooms = report.facts["size"], report.facts["rooms"]

@@ -84,7 +84,11 @@ def import_house(
         if fits < POINTS:  # Use fewer points than fit, because other random samples may leave larger gaps.
             points = max(fits - 2, 1)
             set_points(path, points)
-            report = check_house_name(str(path))
+            report = replace(
+                report,
+                findings=tuple(f for f in report.findings if f.rule != "points"),
+                facts={**report.facts, "points that fit": f"{points} or more"},
+            )
             decisions.append(
                 ImportDecision("points", f"{points}", f"{fits} places for objects a metre apart")
             )
