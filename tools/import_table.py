@@ -1,14 +1,16 @@
 """Import the public scenes of `import_scenes.toml`, and print the table of docs/import.md.
 
-`python -m tools.import_table FOLDER` expects the commits of that file below FOLDER. A scene is usable if each model is
-where the source places it, and if the house keeps the rules of a usable house.
+`python -m tools.import_table FOLDER [NAME ...]` expects the commits of that file below FOLDER. With names, only rows whose
+scene contains one of them are made. A scene is usable if each model is where the source places it, and if the house keeps
+the rules of a usable house.
 """
 
 import re
 import sys
 import tempfile
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -50,7 +52,7 @@ class SceneRow:
         return f"| {self.name} | {places} | {' | '.join(cells)} |"
 
 
-def main(folder: Path) -> None:
+def main(folder: Path, names: Sequence[str]) -> None:
     found = read_toml(SCENES)
     folders = [folder / repository.replace("/", "+") for repository in found["commits"]]
     models = tuple(path for one in folders for path in (one / "models", one) if path.is_dir())
@@ -59,8 +61,9 @@ def main(folder: Path) -> None:
         for scene in scenes:
             source = folder / repository.replace("/", "+") / scene
             name = f"{repository.partition('/')[2]}/{Path(scene).name}"
-            sys.stdout.write(f"{scene_row(name, source, models)}\n")
-            sys.stdout.flush()
+            if not names or any(wanted in name for wanted in names):
+                sys.stdout.write(f"{scene_row(name, source, models)}\n")
+                sys.stdout.flush()
 
 
 def scene_row(name: str, source: Path, models: tuple[Path, ...]) -> SceneRow:
@@ -95,7 +98,7 @@ def distances(source: Path, options: HouseOptions) -> Iterator[float]:
         poses |= dict(_poses(state))
         for model in state.findall("model"):
             if set((model.findtext("scale") or "1").split()) != {"1"}:
-                del poses[model.get("name", "")]
+                poses.pop(model.get("name", ""), None)
         world.remove(state)
     for model in (*world.findall("model"), *world.findall("include")):
         for pose in model.findall("pose"):
@@ -115,8 +118,17 @@ def distances(source: Path, options: HouseOptions) -> Iterator[float]:
 
 
 def _poses(parent: ET.Element) -> Iterator[tuple[str, Floats]]:
-    for element in (*parent.findall("model"), *parent.findall("include")):
-        name = element.get("name") or element.findtext("name") or ""
+    """Yield name and pose of each model whose name is unique. Most includes without a name have that of their file."""
+    elements = [*parent.findall("model"), *parent.findall("include")]
+    uris = [(element.findtext("uri") or "").strip() for element in elements]
+    names = [
+        element.get("name") or element.findtext("name") or uri.rpartition("/")[2]
+        for element, uri in zip(elements, uris, strict=True)
+    ]
+    counts = Counter(names)
+    for element, name in zip(elements, names, strict=True):
+        if counts[name] > 1:
+            continue
         pose = np.array((element.findtext("pose") or "0 0 0 0 0 0").split(), float)
         yield name, compose_matrix(translate=pose[:3], angles=pose[3:])
 
@@ -130,4 +142,4 @@ def _points(source: Path, options: HouseOptions) -> dict[str, Floats]:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), sys.argv[2:])

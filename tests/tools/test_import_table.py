@@ -36,7 +36,7 @@ def test_a_refused_scene_is_a_row_with_its_reason(tmp_path):
 @pytest.mark.slow
 def test_a_usable_scene_is_a_row_with_its_size_and_places(tmp_path):
     row = scene_row("flat", write_sdf(tmp_path, extra=MOVED), ())
-    assert (row.in_place, row.models, row.outline, row.rooms) == (10, 10, "closed by its walls", "2")
+    assert (row.in_place, row.models, row.outline, row.rooms) == (11, 11, "closed by its walls", "2")
     assert str(row).endswith("| **usable** |")
     assert int(row.places.split()[0]) >= 6
 

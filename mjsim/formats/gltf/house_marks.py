@@ -6,11 +6,11 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
+from mjsim.formats.scene.mesh_files import gltf_header
 from mjsim.formats.scene.source_scene import Bin, NamedRoom, boxes_of
 from mjsim.values.errors import AssetError, brief
 
 MARKS = "mjsim_house"  # key in the extras of the root node
-_MAGIC, _START = b"glTF", 20  # first bytes of a GLB file, and position of its JSON text
 
 
 class MarkedRoom(msgspec.Struct):
@@ -59,12 +59,8 @@ class _Header(msgspec.Struct):
 
 def read_marks(path: Path) -> HouseMarks:
     """Read the marks of a GLB or glTF file. Other files have none. Raise an AssetError if they are damaged."""
-    with path.open("rb") as file:
-        start = file.read(_START)
-        binary = start.startswith(_MAGIC)
-        text = file.read(int.from_bytes(start[12:16], "little")) if binary else start + file.read()
     try:
-        extras = [node.extras for node in msgspec.json.decode(text, type=_Header).nodes]
+        extras = [node.extras for node in msgspec.json.decode(gltf_header(path), type=_Header).nodes]
         found = next((e[MARKS] for e in extras if isinstance(e, dict) and MARKS in e), {})
         marks = msgspec.convert(found, HouseMarks)
         marks.rooms()

@@ -5,7 +5,6 @@ If the file format defines a unit and a vertical axis, the result is in metres w
 
 import io
 import logging
-import mmap
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -27,6 +26,7 @@ from mjsim.values.errors import AssetError
 OBJECT_SUFFIXES = (".glb", ".obj", ".stl", ".ply")
 MAX_FILE = 500_000_000  # maximum file size in bytes
 MAX_TRIANGLES = 5_000_000
+_MAX_VALUES = 100_000_000  # maximum number of vertices, vertex attributes and indices in a glTF file
 SCENE_SUFFIXES = (".glb", ".gltf", ".dae", ".obj", ".stl", ".ply")
 GLTF = (".glb", ".gltf")
 Y_TO_Z = rotation_matrix(np.pi / 2, [1, 0, 0])
@@ -66,12 +66,13 @@ def read_surface(path: Path) -> Surface:
     """Read all triangles of a mesh file in its own unit and axes. Raise `AssetError` if there are none."""
     check_mesh_file(path)
     with parsing(path):
-        geometries = trimesh.load_scene(path, process=False, resolver=Nearby(path)).dump()
+        scene = trimesh.load_scene(path, process=False, resolver=Nearby(path))
+    _check_triangles(path, scene)
+    with parsing(path):
+        geometries = scene.dump()
     meshes = [g for g in geometries if isinstance(g, trimesh.Trimesh) and len(g.faces)]
     if not meshes:
         raise AssetError(f"{path} {_what_it_has(geometries)}; export it as a mesh of triangles")
-    if (count := sum(len(mesh.faces) for mesh in meshes)) > MAX_TRIANGLES:
-        raise AssetError(f"{path} has {count} triangles; reduce it to {MAX_TRIANGLES} or fewer")
     with parsing(path):
         return joined([surface_of(mesh, linear=path.suffix.lower() == ".glb") for mesh in meshes])
 
@@ -97,10 +98,23 @@ def check_mesh_file(path: Path, suffixes: tuple[str, ...] = OBJECT_SUFFIXES) -> 
     if size > MAX_FILE:
         raise AssetError(f"{path} has {size / 1e6:.0f} MB; reduce it to {MAX_FILE / 1e6:.0f} MB or less")
     if path.suffix.lower() in GLTF:
-        with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            needed = re.findall(rb'"extensionsRequired"\s*:\s*\[([^]]*)', data)
+        header = gltf_header(path)
+        needed = re.findall(rb'"extensionsRequired"\s*:\s*\[([^]]*)', header)
         if packed := re.search(rb"\w*meshopt\w*", b" ".join(needed)):
             raise AssetError(f"{path} is compressed ({packed[0].decode()}); export it without compression")
+        values = sum(int(count[:20]) for count in re.findall(rb'"count"\s*:\s*(\d+)', header))
+        if values > _MAX_VALUES:
+            raise AssetError(f"{path} claims to have {values:,} vertices and indices; reduce or repair it")
+
+
+def gltf_header(path: Path) -> bytes:
+    """Return the JSON text of a glTF or GLB file."""
+    with path.open("rb") as file:
+        start = file.read(
+            20
+        )  # of a GLB file: magic number, version, length; length and type of the JSON text
+        binary = start.startswith(b"glTF")
+        return file.read(int.from_bytes(start[12:16], "little")) if binary else start + file.read()
 
 
 @contextmanager
@@ -163,6 +177,8 @@ def read_parts(path: Path, transform: Floats | None = None) -> list[MeshPart]:
     with parsing(path):
         source = _without_comments(path) if suffix == ".dae" else path
         scene = trimesh.load_scene(source, file_type=suffix[1:], process=False, resolver=Nearby(path))
+    _check_triangles(path, scene)
+    with parsing(path):
         known: dict[str, Surface] = {}
         parts = []
         for name, key, node in sorted(_nodes(scene)):
@@ -176,9 +192,15 @@ def read_parts(path: Path, transform: Floats | None = None) -> list[MeshPart]:
             parts.append(MeshPart(name, surface, is_opaque(mesh), loose))
     if not parts:
         raise AssetError(f"{path} has no triangles; export it as a mesh of triangles")
-    if (count := sum(len(part.surface) for part in parts)) > MAX_TRIANGLES:
-        raise AssetError(f"{path} has {count} triangles; reduce it to {MAX_TRIANGLES} or fewer")
     return parts
+
+
+def _check_triangles(path: Path, scene: trimesh.Scene) -> None:
+    """Raise `AssetError` if a scene has too many triangles, including those of repeated meshes."""
+    keys = (scene.graph[node][1] for node in scene.graph.nodes_geometry)
+    count = sum(len(getattr(scene.geometry[key], "faces", ())) for key in keys)
+    if count > MAX_TRIANGLES:
+        raise AssetError(f"{path} has {count} triangles; reduce it to {MAX_TRIANGLES} or fewer")
 
 
 def _nodes(scene: trimesh.Scene) -> Iterator[tuple[str, str, str]]:
