@@ -1,8 +1,8 @@
 """Import the public scenes of `import_scenes.toml`, and print the table of docs/import.md.
 
-`python -m tools.import_table FOLDER [NAME ...]` expects the commits of that file below FOLDER. With names, only rows whose
-scene contains one of them are made. A scene is usable if each model is where the source places it, and if the house keeps
-the rules of a usable house.
+`python -m tools.import_table FOLDER [NAME ...]` expects the commits of that file below FOLDER. With names, it imports
+only the scenes whose row contains one of them. A scene is usable if each model is where the source places it, and if
+the house keeps the rules of a usable house.
 """
 
 import re
