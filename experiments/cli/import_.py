@@ -72,7 +72,7 @@ def add_parser(commands: Any) -> None:
         "--units", choices=tuple(UNITS), help="unit (default: m for glTF, else guessed from the size)"
     )
     shape.add_argument(
-        "--up", choices=AXES, help="vertical axis (default: y for glTF and OBJ, z for STL and PLY)"
+        "--up", choices=AXES, help="vertical axis (default: y for glTF, else guessed from base and stability)"
     )
     shape.add_argument("--scale", type=float, default=1.0, metavar="F", help="factor applied after the unit")
     weight = shape.add_mutually_exclusive_group()

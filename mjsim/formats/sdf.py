@@ -4,14 +4,14 @@ import os
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import trimesh
-from trimesh.transformations import compose_matrix
 
-from mjsim.formats.scene.mesh_files import PLAIN, primitive, read_parts
+from mjsim.formats.scene.mesh_colours import PLAIN
+from mjsim.formats.scene.mesh_files import MAX_TRIANGLES, MeshPart, primitive, read_parts
 from mjsim.formats.scene.source_scene import (
     HouseOptions,
     ImportDecision,
@@ -22,6 +22,7 @@ from mjsim.formats.scene.source_scene import (
     numbers,
 )
 from mjsim.formats.scene.surface import Floats, Surface
+from mjsim.formats.sdf_poses import DEPTH, SavedState, is_true, pose_of
 from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError
 
@@ -29,7 +30,7 @@ SUFFIXES = (".world", ".sdf")
 _VARIABLES = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")
 _BUILT_IN = ("sun", "ground_plane")  # models that are part of Gazebo
 _THIN = 0.002  # thickness of the boxes that replace planes, in metres
-_DEPTH = 20  # maximum nesting depth of models
+_MAX_MODELS = 20_000  # maximum number of models in a world, including nested models
 _PLANE = 30.0  # maximum side length of imported planes, in metres
 
 
@@ -38,7 +39,13 @@ def read_sdf(path: Path, options: HouseOptions) -> SourceScene:
     root = _root(path)
     reader = _WorldReader(path, options)
     top = root.find("world")
-    pieces = list(reader.models(root if top is None else top, np.eye(4), path.parent, 0, static=False))
+    state = SavedState(path, None if top is None else top.find("state"))
+    pieces: list[ScenePiece] = []
+    count = 0
+    for piece in reader.world(root if top is None else top, state):
+        pieces.append(piece)
+        if (count := count + len(piece.surface)) > MAX_TRIANGLES:
+            raise AssetError(f"{path} has more than {MAX_TRIANGLES:,} triangles; remove or simplify models")
     if not pieces:
         why = "give the world file of a house"
         if files := reader.missing.files:
@@ -51,10 +58,12 @@ def read_sdf(path: Path, options: HouseOptions) -> SourceScene:
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    name: str  # name of the outermost enclosing model
-    frame: Floats  # transform from the link to the world, shape (4, 4)
+    name: str  # name of the outermost enclosing model, or an empty string outside of models
+    frame: Floats  # transform from the model or link to the world, shape (4, 4)
     folder: Path
-    loose: bool
+    state: SavedState
+    static: bool = False
+    depth: int = 0  # number of enclosing models
 
 
 class _WorldReader:
@@ -66,33 +75,37 @@ class _WorldReader:
             self._folders += [Path(part) for part in os.environ.get(variable, "").split(":") if part]
         self.missing = MissingFiles(options.skip_missing)
         self._unknown: dict[str, int] = {}
-        self._meshes: dict[Path, list[tuple[str, Surface]]] = {}
+        self._count = 0  # number of models that have been read
+        self._meshes: dict[Path, list[MeshPart]] = {}
 
     def unknown_kinds(self) -> tuple[ImportDecision, ...]:
         return tuple(
             left_out(f"{n} of shape <{kind}>", "it cannot be read") for kind, n in self._unknown.items()
         )
 
-    def models(
-        self, parent: ET.Element, frame: Floats, folder: Path, depth: int, *, static: bool, name: str = ""
-    ) -> Iterator[ScenePiece]:
-        """Yield the pieces of all models in a world or model. `name` is the name of the outermost model."""
-        if depth > _DEPTH:
-            raise AssetError(f"{self._path} nests models more than {_DEPTH} deep; does one include itself?")
-        for element in parent.findall("include"):
-            yield from self._included(element, frame, depth, static, name)
-        for model in parent.findall("model"):
-            placed = frame @ _pose(model, self._path, parent)
-            yield from self._model(model, placed, folder, depth, static, name)
+    def world(self, world: ET.Element, state: SavedState) -> Iterator[ScenePiece]:
+        """Yield the pieces of all models in a world, in their saved state."""
+        at = _Place("", np.eye(4), self._path.parent, state)
+        yield from self._models(world, at)
+        inserted = None if state.element is None else state.element.find("insertions")
+        if inserted is not None:
+            yield from self._models(inserted, at)
 
-    def _included(
-        self, element: ET.Element, frame: Floats, depth: int, static: bool, name: str
-    ) -> Iterator[ScenePiece]:
+    def _models(self, parent: ET.Element, at: _Place) -> Iterator[ScenePiece]:
+        if at.depth > DEPTH:
+            raise AssetError(f"{self._path} nests models more than {DEPTH} deep; does one include itself?")
+        for element in parent.findall("include"):
+            yield from self._included(element, at)
+        for model in parent.findall("model"):
+            placed = replace(at, frame=at.frame @ pose_of(model, self._path, parent))
+            yield from self._model(model, placed, model.get("name", "model"))
+
+    def _included(self, element: ET.Element, at: _Place) -> Iterator[ScenePiece]:
         uri = (element.findtext("uri") or "").strip()
         built_in = uri.rpartition("/")[2].lower().replace(" ", "_")
         if built_in == "ground_plane":  # only the height matters, because the house has its own floor
             ground = trimesh.creation.box((_PLANE, _PLANE, _THIN)).apply_translation((0, 0, -_THIN / 2))
-            surface = primitive(ground, np.array(PLAIN)).moved(frame @ _pose(element, self._path))
+            surface = primitive(ground, np.array(PLAIN)).moved(at.frame @ pose_of(element, self._path))
             yield ScenePiece(built_in, surface, seen=False, solid=False)
         if built_in in _BUILT_IN:
             return
@@ -103,43 +116,49 @@ class _WorldReader:
         model = _root(file).find("model")
         if model is None:
             raise AssetError(f"{file} has no <model>; correct the include of {uri}")
-        name = name or (element.findtext("name") or model.get("name") or "").strip()
         own = element.find("pose")
-        frame = frame @ (_pose(model, file) if own is None else _pose(element, self._path))
-        static = static or _is_true(element.findtext("static"))
-        yield from self._model(model, frame, file.parent, depth, static, name)
+        frame = at.frame @ (pose_of(model, file) if own is None else pose_of(element, self._path))
+        static = at.static or is_true(element.findtext("static"))
+        name = (element.findtext("name") or model.get("name") or "").strip()
+        yield from self._model(model, replace(at, frame=frame, folder=file.parent, static=static), name)
 
-    def _model(
-        self, model: ET.Element, frame: Floats, folder: Path, depth: int, static: bool, name: str
-    ) -> Iterator[ScenePiece]:
-        name = name or model.get("name", "model")
-        static = static or _is_true(model.findtext("static"))
+    def _model(self, model: ET.Element, at: _Place, own_name: str) -> Iterator[ScenePiece]:
+        """Yield the pieces of a model and of its nested models. `at.state` belongs to the enclosing model."""
+        if at.depth == 0 and own_name in at.state.deleted:
+            return
+        self._count += 1
+        if self._count > _MAX_MODELS:
+            raise AssetError(f"{self._path} has more than {_MAX_MODELS} models; does one include itself?")
+        state, name = at.state.of(own_name), at.name or own_name
+        static = at.static or is_true(model.findtext("static"))
+        at = _Place(name, state.model_frame(at.frame), at.folder, state, static, at.depth + 1)
         for link in model.findall("link"):
-            at = _Place(name, frame @ _pose(link, self._path, model), folder, not static)
-            visuals = [s for v in link.findall("visual") for s in self._shape(v, at)]
-            solids = [s for c in link.findall("collision") for s in self._shape(c, at)]
-            yield from (ScenePiece(name, s, seen=True, solid=not solids, loose=at.loose) for s in visuals)
-            yield from (ScenePiece(name, s, seen=not visuals, solid=True, loose=at.loose) for s in solids)
-        yield from self.models(model, frame, folder, depth + 1, static=static, name=name)
+            frame = state.link_frame(link.get("name", ""), at.frame @ pose_of(link, self._path, model))
+            placed = replace(at, frame=frame)
+            visuals = [s for v in link.findall("visual") for s in self._shape(v, placed)]
+            solids = [s for c in link.findall("collision") for s in self._shape(c, placed)]
+            yield from (ScenePiece(name, s, seen=True, solid=not solids, loose=not static) for s in visuals)
+            yield from (ScenePiece(name, s, seen=not visuals, solid=True, loose=not static) for s in solids)
+        yield from self._models(model, at)
 
     def _shape(self, element: ET.Element, at: _Place) -> Iterator[Surface]:
         geometry = element.find("geometry")
         if geometry is None or not len(geometry):
             return
         shape = geometry[0]
-        frame = at.frame @ _pose(element, self._path)
+        frame = at.frame @ pose_of(element, self._path)
         if shape.tag == "mesh":
-            yield from self._mesh(shape, frame, at.folder)
+            yield from self._mesh(shape, frame, at)
             return
         made = _primitive(shape, self._path)
         if made is None:
             self._unknown[shape.tag] = self._unknown.get(shape.tag, 0) + 1
             return
-        made.apply_transform(frame)
+        made.apply_transform(frame @ np.diag([*at.state.shape_scale(shape.tag, np.ones(3)), 1.0]))
         yield primitive(made, _colour(element))
 
-    def _mesh(self, shape: ET.Element, frame: Floats, folder: Path) -> Iterator[Surface]:
-        file = self._find((shape.findtext("uri") or "").strip(), folder)
+    def _mesh(self, shape: ET.Element, frame: Floats, at: _Place) -> Iterator[Surface]:
+        file = self._find((shape.findtext("uri") or "").strip(), at.folder)
         if file is None:
             return
         if file not in self._meshes:
@@ -150,8 +169,9 @@ class _WorldReader:
                     raise
                 self._meshes[file] = []
                 self.missing.files.append(file.name)
-        scale = numbers((shape.findtext("scale") or "1 1 1").split(), 3, self._path)
-        yield from (s.moved(frame @ np.diag([*scale, 1.0])) for _, s in self._meshes[file])
+        own = numbers((shape.findtext("scale") or "1 1 1").split(), 3, self._path)
+        scale = at.state.shape_scale("mesh", own)
+        yield from (p.surface.moved(frame @ np.diag([*scale, 1.0])) for p in self._meshes[file])
 
     def _find(self, uri: str, folder: Path | None) -> Path | None:
         """Return the file or folder that a URI names, or None if it is missing and may be skipped."""
@@ -160,7 +180,11 @@ class _WorldReader:
             rest = rest.rstrip("/").rpartition("/")[2]
         rest = rest.lstrip("/") if scheme == "model" else rest
         folders = [*([] if folder is None else [folder, folder.parent]), *self._folders]
-        found = next((base / rest for base in folders if rest and (base / rest).exists()), None)
+        # A file URI contains the path on the author's machine, so its last parts are looked up as well.
+        parts = rest.split("/")
+        ends = range(max(1, len(parts) - 1)) if scheme == "file" else range(1)
+        names = ["/".join(parts[first:]) for first in ends]
+        found = next((b / name for name in names for b in folders if name and (b / name).exists()), None)
         if found is None:
             if not self.missing.skip:
                 raise AssetError(
@@ -198,36 +222,6 @@ def _model_file(folder: Path) -> Path:
     raise AssetError(f"the model {folder} has no model.sdf; correct its model.config")
 
 
-def _pose(element: ET.Element, path: Path, model: ET.Element | None = None, depth: int = 0) -> Floats:
-    """Return the transform (4, 4) that the <pose> of an element specifies.
-
-    Args:
-        element: A model, link, joint or other element, whose pose consists of x, y, z, roll, pitch and yaw.
-        path: The file that error messages mention.
-        model: The element that contains the target of `relative_to`.
-        depth: Number of `relative_to` references that have been followed so far.
-    """
-    pose = element.find("pose")
-    attributes = {} if pose is None else pose.attrib
-    named = attributes.get("relative_to") or element.get("attached_to") or ""
-    if element.tag == "joint":
-        named = named or element.findtext("child") or ""
-    frame = np.eye(4)
-    if named not in ("", "world", "__model__"):
-        other = next((e for e in (() if model is None else model) if e.get("name") == named), None)
-        if other is None or depth > _DEPTH:
-            raise AssetError(f"{path} has a <pose> relative to {named!r}, which is not there; correct it")
-        frame = _pose(other, path, model, depth + 1)
-    if pose is None or not (pose.text or "").strip():
-        return frame
-    if attributes.get("rotation_format", "euler_rpy") != "euler_rpy":
-        raise AssetError(f"{path} has a <pose> with {dict(attributes)}; write it as 'x y z roll pitch yaw'")
-    values = numbers((pose.text or "").split(), 6, path)
-    if _is_true(pose.get("degrees")):
-        values[3:] = np.deg2rad(values[3:])
-    return np.asarray(frame @ compose_matrix(translate=values[:3], angles=values[3:]))
-
-
 def _primitive(shape: ET.Element, path: Path) -> trimesh.Trimesh | None:
     def number(name: str, count: int = 1) -> Floats:
         return numbers((shape.findtext(name) or "").split(), count, path)
@@ -253,7 +247,3 @@ def _colour(element: ET.Element) -> Floats:
         if len(words) >= 3:
             return np.clip([float(word) for word in words[:3]], 0.0, 1.0)
     return np.array(PLAIN)
-
-
-def _is_true(text: str | None) -> bool:
-    return (text or "").strip().lower() in ("1", "true")

@@ -8,15 +8,18 @@ from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import Any
 
+import msgspec
 import mujoco
 import numpy as np
 
 from mjsim.formats.gltf.cube_maps import FACES
 from mjsim.formats.gltf.glb import UPRIGHT, Glb, divided, pixels, texture_encoder, webp
+from mjsim.formats.gltf.house_marks import MARKS, HouseMarks, MarkedBin, MarkedRoom
 from mjsim.formats.gltf.shapes import Floats
 from mjsim.formats.gltf.store import SCENE
 from mjsim.formats.gltf.surfaces import GeomSurface, drawn_scene, lights_of, rounded, surfaces
 from mjsim.formats.gltf.welding import welded
+from mjsim.formats.scene.mesh_files import LOOSE
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.house.compiled.house import compiled_house
@@ -143,14 +146,27 @@ class _Export:
         nodes = self._rooms(glb)
         for placed in self._scene.episode.objects:
             position, rotation, quaternion = self._frame(self._scene.index.body(placed.name))
-            inner = glb.mesh(placed.model, self._carried(placed, position, rotation))
+            inner = glb.mesh(placed.model, self._carried(placed, position, rotation), {LOOSE: True})
             pose = {"translation": position.tolist(), "rotation": np.roll(quaternion, -1).tolist()}
             nodes.append(glb.node(placed.name, [inner], **pose))
-        return glb.content(glb.node("house", nodes, rotation=UPRIGHT, extras=lights_of(self._drawn)))
+        return glb.content(self._root(glb, nodes))
 
     def _house(self) -> tuple[Glb, int]:
         glb = Glb(self._images)
-        return glb, glb.node("house", self._rooms(glb), rotation=UPRIGHT, extras=lights_of(self._drawn))
+        return glb, self._root(glb, self._rooms(glb))
+
+    def _root(self, glb: Glb, nodes: list[int]) -> int:
+        extras = {**lights_of(self._drawn), MARKS: self._marks()}
+        return glb.node("house", nodes, rotation=UPRIGHT, extras=extras)
+
+    def _marks(self) -> Any:
+        rooms = zip(self._scene.rooms.keys, _rooms(self._scene.rooms), strict=True)
+        bins = []
+        for key, receptacle in self._scene.catalogue.receptacles.items():
+            mount = self._data.site(f"mount:{key}")
+            yaw, position = math.atan2(mount.xmat[3], mount.xmat[0]), rounded(mount.xpos)
+            bins.append(MarkedBin(key, receptacle.room, receptacle.place, tuple(position), round(yaw, 6)))
+        return msgspec.to_builtins(HouseMarks([MarkedRoom(key, **room) for key, room in rooms], bins))
 
     def _rooms(self, glb: Glb) -> list[int]:
         """Add nodes for the static geoms of each part of the house. Ceilings have nodes of their own."""

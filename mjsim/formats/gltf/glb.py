@@ -73,8 +73,17 @@ class Glb:
         self._nodes.append(node)
         return len(self._nodes) - 1
 
-    def mesh(self, name: str, surfaces: Iterable[GeomSurface], **properties: Any) -> int:
-        """Add a node with a mesh of surfaces that are merged by material. Return the index of the node."""
+    def mesh(
+        self,
+        name: str,
+        surfaces: Iterable[GeomSurface],
+        marks: Mapping[str, Any] | None = None,
+        **properties: Any,
+    ) -> int:
+        """Add a node with a mesh of surfaces that are merged by material. Return the index of the node.
+
+        `marks` are the extras of the mesh, and `properties` are additional glTF properties of the node.
+        """
         groups: dict[MaterialKey, list[GeomSurface]] = {}
         for surface in surfaces:
             groups.setdefault(MaterialKey.of(surface), []).append(surface)
@@ -82,7 +91,9 @@ class Glb:
         low, extent = every.min(axis=0), float(np.ptp(every, axis=0).max())
         step = next((step for step in _STEPS if extent / step < 65535.0), extent / 65535.0)
         primitives = [self._primitive(key, groups[key], low, step) for key in sorted(groups)]
-        self._meshes.append({"name": name, "primitives": primitives})
+        self._meshes.append(
+            {"name": name, "primitives": primitives, **({"extras": dict(marks)} if marks else {})}
+        )
         return self.node(
             name, mesh=len(self._meshes) - 1, translation=low.tolist(), scale=[step] * 3, **properties
         )

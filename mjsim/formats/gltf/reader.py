@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from trimesh.transformations import quaternion_matrix, scale_matrix
 
+from mjsim.formats.gltf.house_marks import HouseMarks, read_marks
 from mjsim.formats.scene.mesh_files import GLTF, SCENE_SUFFIXES, Y_TO_Z, read_parts
 from mjsim.formats.scene.source_scene import (
     MAX_SIDE,
@@ -39,7 +40,7 @@ RECEPTACLE = "mjsim_receptacle"
 def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
     """Read a house from a mesh file. Each node of the scene becomes a piece."""
     parts = read_parts(path)
-    points = np.concatenate([surface.corners.reshape(-1, 3) for _, surface in parts])
+    points = np.concatenate([part.surface.corners.reshape(-1, 3) for part in parts])
     sides = np.ptp(points, axis=0)
     frame = np.eye(4)
     notes: list[ImportDecision] = []
@@ -57,8 +58,13 @@ def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
         unit = unit_of(longest) or "m"
         notes.append(ImportDecision("unit", unit, f"then its longest side is {longest * UNITS[unit]:.1f} m"))
     frame = scale_matrix(UNITS[unit or "m"] * options.scale) @ frame
-    pieces = tuple(ScenePiece(name, surface.moved(frame)) for name, surface in parts)
-    return SourceScene(pieces, f"{path.suffix[1:].upper()} scene", tuple(notes))
+    pieces = tuple(ScenePiece(p.name, p.surface.moved(frame), p.seen, loose=p.loose) for p in parts)
+    marks = (
+        read_marks(path) if path.suffix.lower() in GLTF and np.allclose(frame, np.eye(4)) else HouseMarks()
+    )
+    return SourceScene(
+        pieces, f"{path.suffix[1:].upper()} scene", tuple(notes), marks.rooms(), marks.places()
+    )
 
 
 def read_habitat(path: Path, options: HouseOptions) -> SourceScene:
@@ -163,9 +169,9 @@ class _HabitatReader:
             if file is None:
                 continue
             whole = own if file.suffix.lower() in GLTF else own @ Y_TO_Z
-            for part, surface in read_parts(file, whole):
-                solid = not seen or collision is None
-                yield ScenePiece(part if kind == "stage" else name, surface, seen, solid, loose)
+            for part in read_parts(file, whole):
+                solid, title = not seen or collision is None, part.name if kind == "stage" else name
+                yield ScenePiece(title, part.surface, seen and part.seen, solid, loose)
 
     def _mesh(self, config: Path | None, asset: str) -> Path | None:
         mesh = (config or self._path).parent / asset

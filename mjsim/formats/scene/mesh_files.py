@@ -5,20 +5,19 @@ If the file format defines a unit and a vertical axis, the result is in metres w
 
 import io
 import logging
-import mmap
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from trimesh.resolvers import FilePathResolver
 from trimesh.transformations import rotation_matrix, scale_matrix
 
+from mjsim.formats.scene.mesh_colours import is_opaque, surface_of
 from mjsim.formats.scene.source_scene import TEXTURE_SIDE
 from mjsim.formats.scene.surface import Floats, Surface, joined
 from mjsim.support.files import check_input, read_bytes
@@ -27,33 +26,53 @@ from mjsim.values.errors import AssetError
 OBJECT_SUFFIXES = (".glb", ".obj", ".stl", ".ply")
 MAX_FILE = 500_000_000  # maximum file size in bytes
 MAX_TRIANGLES = 5_000_000
-PLAIN = (0.74, 0.72, 0.68)  # RGB colour of meshes without a colour
+_MAX_VALUES = 100_000_000  # maximum number of vertices, vertex attributes and indices in a glTF file
 SCENE_SUFFIXES = (".glb", ".gltf", ".dae", ".obj", ".stl", ".ply")
 GLTF = (".glb", ".gltf")
 Y_TO_Z = rotation_matrix(np.pi / 2, [1, 0, 0])
+_TEXTURES = ("materials/textures", "textures", "materials/scripts")  # folders next to a mesh's folder
+LOOSE = "mjsim_loose"  # key in the extras of a glTF mesh that marks a movable object
 
 
-class Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
-    """A resolver for files that a mesh file refers to, such as materials."""
+class Nearby(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
+    """A resolver for files to which a mesh file refers, such as materials and textures."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__(file)
+        self._file = file
 
     def absolute(self, name: str) -> Path:
         """Return the path of a referenced file. Raise `OSError` for pipes, devices and oversized files."""
-        path = Path(super().absolute(name))
+        path, root = referenced(self._file, name), self._file.parent.resolve().parent
+        if not path.is_relative_to(root):
+            raise ValueError(f"{name!r} is outside of {root}")
         if path.exists():
             check_input(path)
         return path
+
+
+def referenced(file: Path, name: str) -> Path:
+    """Return the path of a file to which a mesh file refers.
+
+    If it is not there, look for it in the folders in which Gazebo models keep their textures.
+    """
+    folder = file.parent.resolve()
+    others = (folder.parent / place / Path(name).name for place in _TEXTURES)
+    path = (folder / name).resolve()
+    return path if path.exists() else next((other for other in others if other.exists()), path)
 
 
 def read_surface(path: Path) -> Surface:
     """Read all triangles of a mesh file in its own unit and axes. Raise `AssetError` if there are none."""
     check_mesh_file(path)
     with parsing(path):
-        geometries = trimesh.load_scene(path, process=False, resolver=Beside(path)).dump()
+        scene = trimesh.load_scene(path, process=False, resolver=Nearby(path))
+    _check_triangles(path, scene)
+    with parsing(path):
+        geometries = scene.dump()
     meshes = [g for g in geometries if isinstance(g, trimesh.Trimesh) and len(g.faces)]
     if not meshes:
         raise AssetError(f"{path} {_what_it_has(geometries)}; export it as a mesh of triangles")
-    if (count := sum(len(mesh.faces) for mesh in meshes)) > MAX_TRIANGLES:
-        raise AssetError(f"{path} has {count} triangles; reduce it to {MAX_TRIANGLES} or fewer")
     with parsing(path):
         return joined([surface_of(mesh, linear=path.suffix.lower() == ".glb") for mesh in meshes])
 
@@ -64,7 +83,7 @@ def missing_colours(path: Path) -> tuple[str, ...]:
         return ()
     named = _named(path, "mtllib")
     pictures = [picture for name in named for picture in _named(path.parent / name, "map_Kd")]
-    return tuple(name for name in dict.fromkeys([*named, *pictures]) if not (path.parent / name).is_file())
+    return tuple(name for name in dict.fromkeys([*named, *pictures]) if not referenced(path, name).is_file())
 
 
 def check_mesh_file(path: Path, suffixes: tuple[str, ...] = OBJECT_SUFFIXES) -> None:
@@ -79,10 +98,23 @@ def check_mesh_file(path: Path, suffixes: tuple[str, ...] = OBJECT_SUFFIXES) -> 
     if size > MAX_FILE:
         raise AssetError(f"{path} has {size / 1e6:.0f} MB; reduce it to {MAX_FILE / 1e6:.0f} MB or less")
     if path.suffix.lower() in GLTF:
-        with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            needed = re.findall(rb'"extensionsRequired"\s*:\s*\[([^]]*)', data)
+        header = gltf_header(path)
+        needed = re.findall(rb'"extensionsRequired"\s*:\s*\[([^]]*)', header)
         if packed := re.search(rb"\w*meshopt\w*", b" ".join(needed)):
             raise AssetError(f"{path} is compressed ({packed[0].decode()}); export it without compression")
+        values = sum(int(count[:20]) for count in re.findall(rb'"count"\s*:\s*(\d+)', header))
+        if values > _MAX_VALUES:
+            raise AssetError(f"{path} claims to have {values:,} vertices and indices; reduce or repair it")
+
+
+def gltf_header(path: Path) -> bytes:
+    """Return the JSON text of a glTF or GLB file."""
+    with path.open("rb") as file:
+        start = file.read(
+            20
+        )  # of a GLB file: magic number, version, length; length and type of the JSON text
+        binary = start.startswith(b"glTF")
+        return file.read(int.from_bytes(start[12:16], "little")) if binary else start + file.read()
 
 
 @contextmanager
@@ -118,78 +150,17 @@ def _named(path: Path, keyword: str) -> list[str]:
         return [found[-1] for found in words if len(found) > 1]
 
 
-def surface_of(mesh: trimesh.Trimesh, *, linear: bool, side: int | None = None) -> Surface:
-    """Convert a trimesh mesh to a surface.
+class MeshPart(NamedTuple):
+    """A part of a mesh file with a single material."""
 
-    Args:
-        mesh: The mesh to convert.
-        linear: True if plain colours are linear, as in glTF.
-        side: Maximum side length of the image in pixels. Larger images are reduced. None keeps the image
-            unchanged.
-    """
-    count = len(mesh.faces)
-    corners = np.asarray(mesh.triangles, np.float64)
-    colours, uv = np.ones((count, 3, 3)), np.zeros((count, 3, 2))
-    colours[:] = PLAIN
-    picture = None
-    visual = mesh.visual
-    if visual.kind == "texture":
-        colours[:], picture = _material(visual.material, side)
-        if visual.uv is None or len(visual.uv) != len(mesh.vertices):
-            picture = None
-        else:
-            uv = np.asarray(visual.uv, np.float64)[mesh.faces]
-    elif visual.kind == "vertex":
-        colours = np.asarray(visual.vertex_colors, np.float64)[mesh.faces][..., :3] / 255
-    elif visual.kind == "face":
-        colours = np.repeat(np.asarray(visual.face_colors, np.float64)[:, None, :3] / 255, 3, axis=1)
-    if linear and visual.kind is not None:
-        colours = _srgb(colours)
-    uv = np.nan_to_num(uv, nan=0.0, posinf=0.0, neginf=0.0)
-    number = np.full(count, -1 if picture is None else 0)
-    return Surface(corners, colours, uv, number, () if picture is None else (picture,))
+    name: str  # name of the node that contains the part
+    surface: Surface
+    seen: bool = True  # False for a translucent part, such as a painted shadow or a pane
+    loose: bool = False  # True if the file marks the part as movable
 
 
-def _material(material: Any, side: int | None) -> tuple[Floats, NDArray[np.float64] | None]:
-    """Return a material's plain colour (3,) and its image (height, width, 3), as RGB values from 0 to 1."""
-    if isinstance(material, trimesh.visual.material.PBRMaterial):
-        factor, picture = material.baseColorFactor, material.baseColorTexture
-    else:
-        factor, picture = getattr(material, "diffuse", None), getattr(material, "image", None)
-    if picture is not None and side is not None:
-        picture = picture.copy()
-        picture.thumbnail((side, side))
-    pixels = None if picture is None else np.asarray(picture.convert("RGB"), np.float64) / 255
-    if factor is None:
-        return np.ones(3) if pixels is not None else np.array(PLAIN), pixels
-    return np.asarray(factor, np.float64)[:3] / 255, pixels
-
-
-def _srgb(linear: Floats) -> Floats:
-    """Convert linear colours to sRGB (IEC 61966-2-1)."""
-    low, high = 12.92 * linear, 1.055 * np.clip(linear, 0.0, 1.0) ** (1 / 2.4) - 0.055
-    return np.where(linear <= 0.0031308, low, high)
-
-
-class _Nearby(Beside):
-    """A resolver for files in the mesh's folder or a sibling folder, such as `../textures/wood.png`."""
-
-    def __init__(self, file: Path) -> None:
-        super().__init__(file)
-        self._file = file
-
-    def absolute(self, name: str) -> Path:
-        folder = self._file.parent.resolve()
-        path = (folder / name).resolve()
-        if not path.is_relative_to(folder.parent):
-            raise ValueError(f"{name!r} is outside of {folder.parent}")
-        if path.exists():
-            check_input(path)
-        return path
-
-
-def read_parts(path: Path, transform: Floats | None = None) -> list[tuple[str, Surface]]:
-    """Read the parts of a mesh file with their node names, and apply a transform (4, 4) to them.
+def read_parts(path: Path, transform: Floats | None = None) -> list[MeshPart]:
+    """Read the parts of a mesh file, and apply a transform (4, 4) to them.
 
     Parts of glTF and COLLADA files are converted to metres with z up. Other formats keep their unit and axes.
 
@@ -205,22 +176,44 @@ def read_parts(path: Path, transform: Floats | None = None) -> list[tuple[str, S
         whole = whole @ _collada_frame(path)
     with parsing(path):
         source = _without_comments(path) if suffix == ".dae" else path
-        scene = trimesh.load_scene(source, file_type=suffix[1:], process=False, resolver=_Nearby(path))
+        scene = trimesh.load_scene(source, file_type=suffix[1:], process=False, resolver=Nearby(path))
+    _check_triangles(path, scene)
+    with parsing(path):
         known: dict[str, Surface] = {}
         parts = []
-        for node in sorted(scene.graph.nodes_geometry):
-            place, key = scene.graph[node]
+        for name, key, node in sorted(_nodes(scene)):
             mesh = scene.geometry[key]
             if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
                 continue
             if key not in known:
                 known[key] = surface_of(mesh, linear=suffix in GLTF, side=TEXTURE_SIDE)
-            parts.append((str(node), known[key].moved(whole @ place)))
+            surface = known[key].moved(whole @ scene.graph[node][0])
+            loose = mesh.metadata.get(LOOSE) is True
+            parts.append(MeshPart(name, surface, is_opaque(mesh), loose))
     if not parts:
         raise AssetError(f"{path} has no triangles; export it as a mesh of triangles")
-    if (count := sum(len(surface) for _, surface in parts)) > MAX_TRIANGLES:
-        raise AssetError(f"{path} has {count} triangles; reduce it to {MAX_TRIANGLES} or fewer")
     return parts
+
+
+def _check_triangles(path: Path, scene: trimesh.Scene) -> None:
+    """Raise `AssetError` if a scene has too many triangles, including those of repeated meshes."""
+    keys = (scene.graph[node][1] for node in scene.graph.nodes_geometry)
+    count = sum(len(getattr(scene.geometry[key], "faces", ())) for key in keys)
+    if count > MAX_TRIANGLES:
+        raise AssetError(f"{path} has {count} triangles; reduce it to {MAX_TRIANGLES} or fewer")
+
+
+def _nodes(scene: trimesh.Scene) -> Iterator[tuple[str, str, str]]:
+    """Yield a name, the key of the geometry, and the node for each geometry of a scene.
+
+    For a glTF mesh with several materials, trimesh creates child nodes with random names. Their name is that of the
+    parent node.
+    """
+    parents = scene.graph.transforms.parents
+    for node in scene.graph.nodes_geometry:
+        key = scene.graph[node][1]
+        shared = scene.geometry[key].metadata.get("from_gltf_primitive")
+        yield str(parents[node] if shared else node), str(key), str(node)
 
 
 def primitive(mesh: trimesh.Trimesh, colour: Floats) -> Surface:

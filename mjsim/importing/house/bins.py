@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
+from trimesh.transformations import rotation_matrix, translation_matrix
 
-from mjsim.formats.scene.source_scene import Bin
+from mjsim.formats.scene.source_scene import Bin, ScenePiece
 from mjsim.formats.scene.surface import Floats
 from mjsim.house.catalogue.catalogue import Catalogue, Receptacle
 from mjsim.house.validation.checked_model import Compiled, compile_model
@@ -23,6 +24,7 @@ _WALL = 0.15  # maximum distance between a bin and the wall behind it, in metres
 _WIDE = 0.4  # radius of a body that can still reach all of the floor once the bins are placed, in metres
 _TRIES = 300  # maximum number of poses that are tried for a bin in each room
 _LOST = 1.0  # walkable floor that a bin may block in addition to its surroundings, in square metres
+_SLACK = 0.01  # distance by which the triangles of a bin in the source may exceed its model, in metres
 # Bins in order of priority, and the types of rooms in which people would look for them.
 _HOMES = {
     "dish_bin": ("kitchen", "living_kitchen", "dining_room"),
@@ -66,10 +68,31 @@ def place_bins(grid: FloorGrid, rooms: Rooms, catalogue: Catalogue, seed: int = 
     return tuple(bins)
 
 
-def _size(receptacle: Receptacle) -> _Size:
+def without_bins(pieces: Sequence[ScenePiece], bins: Sequence[Bin], catalogue: Catalogue) -> list[ScenePiece]:
+    """Remove the triangles of bins from a scene, because the models of the catalogue replace them."""
+    found = list(pieces)
+    for place in bins:
+        compiled = _compiled(catalogue.receptacles[place.key])
+        low, high = compiled.extent(np.union1d(compiled.solid, compiled.shown))
+        frame = translation_matrix((place.x, place.y, place.z)) @ rotation_matrix(place.yaw, (0, 0, 1))
+        to_bin = np.linalg.inv(frame)
+        for number, piece in enumerate(found):
+            corners = piece.surface.moved(to_bin).corners
+            outside = ((corners < low - _SLACK) | (corners > high + _SLACK)).any(axis=(1, 2))
+            if not outside.all():
+                found[number] = replace(piece, surface=piece.surface.select(outside))
+    return [piece for piece in found if len(piece.surface)]
+
+
+def _compiled(receptacle: Receptacle) -> Compiled:
     compiled = compile_model(f"receptacle {receptacle.key}", receptacle.path)
     if not isinstance(compiled, Compiled):
         raise AssetError(f"{receptacle.path} {compiled[0].message}; {compiled[0].remedy}")
+    return compiled
+
+
+def _size(receptacle: Receptacle) -> _Size:
+    compiled = _compiled(receptacle)
     low, high = compiled.extent(compiled.solid)[:, :2]
     (x, y), (width, depth) = ((low + high) / 2).tolist(), (high - low).tolist()
     return _Size(width, depth, (x, y))

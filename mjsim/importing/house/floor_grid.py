@@ -25,6 +25,8 @@ _PAD = 2 * _GAP + 0.3  # margin of the grid around the scene, in metres
 _DRAWN = 10.0  # additional weight of cells in which the source draws a floor
 _LEAST_SHARE = 0.15  # minimum share of the floor that outer walls must enclose
 _MIN_AREA = 3.0  # minimum area enclosed by the walls of a house, in square metres
+# Floor around the obstacles that belongs to a house without walls, in metres. Ground planes extend farther.
+_AROUND = 2.5
 
 Mask = NDArray[np.bool_]
 
@@ -64,6 +66,13 @@ class FloorGrid:
         """The area of the walkable floor, in square metres."""
         return float(self.walkable.sum()) * CELL**2
 
+    @property
+    def outside_share(self) -> float:
+        """The share of the walkable floor from which fewer than three of four directions lead to a wall."""
+        ahead = [np.logical_or.accumulate(self.walls, axis) for axis in (0, 1)]
+        back = [np.flip(np.logical_or.accumulate(np.flip(self.walls, axis), axis), axis) for axis in (0, 1)]
+        return float((np.sum([*ahead, *back], axis=0) < 3)[self.walkable].mean())
+
     def cell(self, point: Sequence[float] | Floats) -> tuple[int, int]:
         """Return the cell at a point (x, y) in metres, or the nearest cell for a point outside the grid."""
         found = np.floor((np.asarray(point)[:2] - self.origin) / CELL).astype(int)
@@ -102,15 +111,14 @@ def make_floor_grid(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floa
     blocked, shut = (_at_heights(shape, origin, chosen, _BAND) for chosen in (solids, doors))
     levels = [_at_heights(shape, origin, solids, band) for band in _WALL]
     drawn = _raster(shape, origin, floor)
-    standing = _box(shape, origin, solids)  # limits ground planes that extend far beyond the house
     for count in (len(_WALL), len(_WALL) - 1):  # try walls up to eye level, then lower walls
         walls = np.logical_and.reduce(levels[:count]) | shut
         # Openings above a sill are treated as closed, so that a window is not taken for a door.
         indoors = _enclosed(walls | levels[0])
         grid = FloorGrid(origin, blocked, walls, shut & ~blocked, indoors, drawn, enclosed=True)
-        whole = replace(grid, indoors=_rectangle(drawn), enclosed=False)
-        near = replace(whole, indoors=whole.indoors & standing)
-        if grid.area >= max(_MIN_AREA, _LEAST_SHARE * near.area):
+        standing = _box(shape, origin, solids, 0.0 if (walls & ~shut).any() else _AROUND)
+        whole = replace(grid, indoors=_rectangle(drawn) & standing, enclosed=False)
+        if grid.area >= max(_MIN_AREA, _LEAST_SHARE * whole.area):
             break
     else:
         grid = whole
@@ -169,10 +177,11 @@ def _rectangle(floor: Mask) -> Mask:
     return inside
 
 
-def _box(shape: tuple[int, ...], origin: Floats, solids: Sequence[Solid]) -> Mask:
+def _box(shape: tuple[int, ...], origin: Floats, solids: Sequence[Solid], margin: float) -> Mask:
+    """Return the cells in the bounding box of all solids, which is extended by a margin in metres."""
     points = np.concatenate([solid.outline for solid in solids] or [np.zeros((1, 2))])
-    (xmin, ymin), (xmax, ymax) = points.min(axis=0), points.max(axis=0)
-    return _raster(shape, origin, [np.array([[xmin, ymin], [xmax, ymin], [xmax, ymax], [xmin, ymax]])])
+    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    return _raster(shape, origin, [np.array([low, [high[0], low[1]], high, [low[0], high[1]]])])
 
 
 def _at_heights(

@@ -33,9 +33,10 @@ from mjsim.formats.sdf import read_sdf
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.check import CheckReport, check_house_name
 from mjsim.house.validation.findings import Finding, errors
-from mjsim.importing.house.bins import place_bins
+from mjsim.importing.house.bins import place_bins, without_bins
 from mjsim.importing.house.drawn_meshes import make_drawn_meshes
 from mjsim.importing.house.floor_grid import FloorGrid, make_floor_grid, too_large
+from mjsim.importing.house.plausibility import doubts
 from mjsim.importing.house.rooms import find_rooms, read_rooms
 from mjsim.importing.house.solids import HIGH, LOW, Solids, make_solids
 from mjsim.importing.house.storey import FAR, counted, floor_and_ceiling, near_pieces, of_one_storey
@@ -79,10 +80,15 @@ def import_house(
         if found := errors(report.findings):
             raise AssetError(f"{source}: {_refusal(found)}")
         fits = int(report.facts["points that fit"].split()[0])
+        unusual = tuple(doubts(house.grid, fits))
         if fits < POINTS:  # Use fewer points than fit, because other random samples may leave larger gaps.
             points = max(fits - 2, 1)
             set_points(path, points)
-            report = check_house_name(str(path))
+            report = replace(
+                report,
+                findings=tuple(f for f in report.findings if f.rule != "points"),
+                facts={**report.facts, "points that fit": f"{points} or more"},
+            )
             decisions.append(
                 ImportDecision("points", f"{points}", f"{fits} places for objects a metre apart")
             )
@@ -93,7 +99,7 @@ def import_house(
         if out.exists():
             out.rename(work / "old")
         new.rename(out)
-    return tuple(decisions), report
+    return tuple(decisions), replace(report, findings=(*report.findings, *unusual))
 
 
 def _without(scene: SourceScene) -> str:
@@ -143,6 +149,9 @@ def _converted(
         ),
     ]
     decisions += [*scene.notes, *far]
+    catalogue = Catalogue.load()
+    given_bins = tuple(replace(b, z=b.z - level) for b in scene.bins)
+    pieces = without_bins(pieces, [b for b in given_bins if b.key in catalogue.receptacles], catalogue)
     pieces, notes = of_one_storey(pieces, ceiling - level)
     decisions += notes
     _check_span(pieces)
@@ -169,8 +178,6 @@ def _converted(
     drawn = [piece for piece in pieces if piece.name not in opened]
     given = read_rooms(options.rooms) if options.rooms is not None else scene.rooms
     rooms = find_rooms(grid, given, drawn)
-    catalogue = Catalogue.load()
-    given_bins = tuple(replace(b, z=b.z - level) for b in scene.bins)
     kept_bins = all(b.key in catalogue.receptacles and b.room in dict(rooms.names) for b in given_bins)
     bins = given_bins if given_bins and kept_bins else place_bins(grid, rooms, catalogue)
     if lost := [room.label for room in given if room.key not in dict(rooms.names)]:

@@ -8,6 +8,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 from scipy.ndimage import binary_fill_holes
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import QhullError
 
 from mjsim.formats.scene.source_scene import ScenePiece, merged_rectangles
@@ -28,7 +30,7 @@ _OVERHEAD = 0.8
 _FURNITURE = 1.5  # Closed meshes up to this side length, in metres, count as solid furniture.
 _ROOM = (2.0, 2.0, 1.8)  # size in metres above which a closed mesh is a hollow room, not a block
 _FEW = 30  # maximum number of voxel boxes in a piece of furniture
-_MAX_PARTS = 60  # maximum number of connected parts of a piece that are processed individually
+_MAX_PARTS = 4000  # maximum number of connected bodies of a piece that are processed individually
 _THIN = 0.01  # minimum thickness of colliding geoms, in metres
 
 
@@ -89,13 +91,33 @@ def make_solids(pieces: Iterable[ScenePiece]) -> Solids:
 
 def _parts(piece: ScenePiece) -> Iterator[trimesh.Trimesh]:
     mesh = piece.surface.mesh()
-    count = mesh.body_count
+    bodies = _bodies(mesh)
+    count = int(bodies.max()) + 1
     whole = count == 1 or count > _MAX_PARTS or (_compact(mesh.extents) and not mesh.is_watertight)
-    parts = [mesh] if whole else mesh.split(only_watertight=False, repair=False)
+    parts = (
+        [mesh] if whole else mesh.submesh([np.flatnonzero(bodies == k) for k in range(count)], repair=False)
+    )
     for part in parts:
         low, high = part.bounds[:, 2]
         if high > LOW and low < (HIGH if np.ptp(part.bounds, axis=0)[:2].max() > _FURNITURE else _HANGING):
             yield part
+
+
+def _bodies(mesh: trimesh.Trimesh) -> NDArray[np.int_]:
+    """Return the number of the connected body of each face, shape (n,).
+
+    Boxes that touch along an edge have four faces there. Faces are connected in pairs in the order of the file, in
+    which the faces of a box are consecutive, so that the boxes remain separate bodies.
+    """
+    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    faces = np.repeat(np.arange(len(mesh.faces)), 3)
+    order = np.lexsort((faces, edges[:, 1], edges[:, 0]))
+    edges, faces = edges[order], faces[order]
+    starts = np.flatnonzero(np.r_[True, (edges[1:] != edges[:-1]).any(axis=1)])
+    rank = np.arange(len(edges)) - np.repeat(starts, np.diff(np.r_[starts, len(edges)]))
+    first = np.flatnonzero((rank[:-1] % 2 == 0) & (rank[1:] == rank[:-1] + 1))
+    links = coo_array((np.ones(len(first)), (faces[first], faces[first + 1])), shape=(len(mesh.faces),) * 2)
+    return np.asarray(connected_components(links, directed=False)[1])
 
 
 def _together(meshes: list[trimesh.Trimesh]) -> list[trimesh.Trimesh]:

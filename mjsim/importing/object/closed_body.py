@@ -99,6 +99,8 @@ def _piecewise(mesh: trimesh.Trimesh) -> ClosedBody:
 
 
 def _closed_piece(piece: trimesh.Trimesh) -> trimesh.Trimesh | None:
+    if _spread(piece.vertices)[0][2] <= _FLAT:  # Filling the hole of a flat piece closes it without a volume.
+        return None
     body = piece.copy()
     if not body.is_watertight:
         trimesh.repair.fill_holes(body, use_fan=True)

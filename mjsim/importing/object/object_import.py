@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from trimesh.transformations import translation_matrix
+from scipy.spatial import QhullError
+from trimesh.transformations import scale_matrix, translation_matrix
 
 from mjsim.formats.scene.mesh_files import missing_colours, read_surface
 from mjsim.formats.scene.source_scene import ImportDecision, ImportOptions
@@ -15,7 +16,7 @@ from mjsim.importing.object.closed_body import MAX_TRIANGLES, ClosedBody, Weight
 from mjsim.importing.object.grip import Grip, find_grip
 from mjsim.importing.object.parts import Parts, convex_parts
 from mjsim.importing.object.resting import STEADY, RestingPose, foot, resting_pose
-from mjsim.importing.object.scaling import Scaling, scaling
+from mjsim.importing.object.scaling import Scaling, scaling, steadier_axis
 from mjsim.importing.object.visual_mesh import VisualMesh, make_visual_mesh
 from mjsim.values.errors import AssetError
 
@@ -51,6 +52,8 @@ def import_object(path: Path, options: ImportOptions) -> ImportedObject:
         return _converted(path, raw, options)
     except AssetError as error:
         raise AssetError(f"{path}: {error}") from error
+    except QhullError as error:
+        raise AssetError(f"{path}: a part of it has no volume; remove the part, or thicken it") from error
 
 
 def _check_options(options: ImportOptions) -> None:
@@ -65,9 +68,12 @@ def _check_options(options: ImportOptions) -> None:
 def _converted(path: Path, raw: Surface, options: ImportOptions) -> ImportedObject:
     longest, middle = _extent(raw)
     found = scaling(path.suffix.lower(), longest, units=options.units, up=options.up, scale=options.scale)
-    surface, dropped = cleaned(raw.moved(found.transform @ translation_matrix(-middle)))
+    surface, dropped = cleaned(raw.moved(scale_matrix(found.factor) @ translation_matrix(-middle)))
     if not len(surface):
         raise AssetError(f"none of its {len(raw)} triangles has an area; export it again")
+    if options.up is None and path.suffix.lower() != ".glb":
+        found = steadier_axis(found, surface.corners.reshape(-1, 3) + found.factor * middle)
+    surface = surface.moved(found.upright)
     mesh = surface.mesh()
     solid = close(simplified(mesh, MAX_TRIANGLES))
     weight = weigh(solid.mesh, mass=options.mass, density=options.density)

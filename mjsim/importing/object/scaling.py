@@ -1,21 +1,28 @@
 """Determine the unit and the vertical axis of a mesh file."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
+import trimesh
+from scipy.spatial import QhullError
 
-from mjsim.formats.scene.source_scene import UNITS
+from mjsim.formats.scene.source_scene import AXES, UNITS
 from mjsim.formats.scene.surface import Floats
 from mjsim.house.validation.object_rules import SIZE
+from mjsim.importing.object.resting import STEADY, tilt
 from mjsim.values.errors import AssetError
 
 MIN_SIDE, MAX_SIDE = SIZE
 _Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+_UNIT = {"y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
+_CLEARLY = math.radians(10.0)  # difference of tilt angles above which a pose is clearly more stable
+_BASE = 0.02  # maximum distance of the base from the origin, relative to the height of the object
 
 
 @dataclass(frozen=True)
 class Scaling:
-    """Converts the coordinates of a mesh file to metres, with the z axis up."""
+    """The unit and the vertical axis of a mesh file."""
 
     unit: str  # unit of length in the file, which is a key of `UNITS`
     up: str  # vertical axis in the file, `y` or `z`
@@ -24,10 +31,9 @@ class Scaling:
     up_reason: str
 
     @property
-    def transform(self) -> Floats:
-        """The homogeneous transform (4, 4) from the coordinates in the file to metres, with the z axis up."""
-        scale = np.diag([self.factor, self.factor, self.factor, 1.0])
-        return np.asarray(_Y_UP @ scale if self.up == "y" else scale)
+    def upright(self) -> Floats:
+        """The homogeneous transform (4, 4) from the axes of the file to axes with z up."""
+        return _Y_UP if self.up == "y" else np.eye(4)
 
 
 def scaling(suffix: str, longest: float, *, units: str | None, up: str | None, scale: float) -> Scaling:
@@ -59,6 +65,32 @@ def _axis(suffix: str) -> tuple[str, str]:
     if suffix == ".obj":
         return "y", "guessed: most programs write OBJ with y up; if not, use --up z"
     return "z", f"guessed: most {suffix[1:].upper()} files have z up; if not, use --up y"
+
+
+def steadier_axis(found: Scaling, points: Floats) -> Scaling:
+    """Replace a guessed vertical axis by the other one if the object probably stands along that one.
+
+    The object does if it can be tilted clearly farther, or if only this axis has the object's base at its origin, as
+    in scanned objects. `points` (n, 3) are in metres, with the axes and the origin of the file.
+    """
+    try:
+        hull = trimesh.convex.convex_hull(points)
+    except QhullError:  # flat sheets
+        return found
+    corners, centre, size = np.asarray(hull.vertices), hull.center_mass, hull.extents
+    tilts = {axis: tilt(corners, centre, -_UNIT[axis]) for axis in AXES}
+    based = {axis: abs((corners @ _UNIT[axis]).min()) <= _BASE * (size @ _UNIT[axis]) for axis in AXES}
+    other = "z" if found.up == "y" else "y"
+    degrees = np.degrees(tilts[other])
+    if tilts[other] < STEADY:
+        return found
+    if based[other] and not based[found.up]:
+        reason = f"guessed: its base is at {other} = 0"
+    elif tilts[other] > tilts[found.up] + _CLEARLY and not based[found.up]:
+        reason = f"guessed: it stands more steadily, up to a tilt of {degrees:.0f} degrees"
+    else:
+        return found
+    return replace(found, up=other, up_reason=f"{reason}; if not, use --up {found.up}")
 
 
 def _advice(longest: float, unit: str, reason: str) -> str:

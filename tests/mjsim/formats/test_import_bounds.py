@@ -1,9 +1,12 @@
 """Files of other programs that would run for minutes, or lose most of their shape, are refused."""
 
+import json
+
 import numpy as np
 import pytest
 
 from mjsim.formats.mjcf_reader import read_mjcf
+from mjsim.formats.scene.mesh_files import read_parts
 from mjsim.formats.scene.source_scene import HouseOptions
 from mjsim.formats.scene.surface import Surface, cleaned
 from mjsim.house.catalogue.model_files import ModelFile
@@ -44,6 +47,32 @@ def test_a_few_copies_are_read(tmp_path):
     path = model(tmp_path / "scene.xml", copies(3, copies(2, GEOM)))
     assert len(read_mjcf(path, HouseOptions()).pieces) == 6
     assert ModelFile.read(path).spec().compile().ngeom == 6
+
+
+def write_gltf(path, *, count=3, copies=1):
+    """Write a glTF file whose nodes share one mesh, and whose vertices are not in the file."""
+    gltf = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": list(range(copies))}],
+        "nodes": [{"mesh": 0}] * copies,
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"count": count, "type": "VEC3", "componentType": 5126}],
+        "bufferViews": [],
+        "buffers": [],
+    }
+    path.write_text(json.dumps(gltf))
+    return path
+
+
+def test_more_vertices_than_a_file_may_have_are_refused_before_they_are_made(tmp_path):
+    with pytest.raises(AssetError, match="claims to have 2,000,000,000 vertices"):
+        read_parts(write_gltf(tmp_path / "it.gltf", count=2_000_000_000))
+
+
+def test_repeated_meshes_are_counted_before_they_are_copied(tmp_path):
+    with pytest.raises(AssetError, match="has 300000000 triangles; reduce it"):
+        read_parts(write_gltf(tmp_path / "it.gltf", count=300_000, copies=3000))
 
 
 def surface(corners):

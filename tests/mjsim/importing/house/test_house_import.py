@@ -2,9 +2,11 @@
 
 import json
 import os
+import re
 import tomllib
 from pathlib import Path
 
+import house_scenes
 import mujoco
 import numpy as np
 import pytest
@@ -12,13 +14,23 @@ import trimesh
 from house_scenes import write_glb, write_habitat, write_mjcf, write_obj, write_robocasa, write_sdf
 
 from experiments.cli import main as cli
-from mjsim.formats.scene.source_scene import HouseOptions
+from mjsim import load_catalogue, sample_episode
+from mjsim.formats.gltf.export import export_episode
+from mjsim.formats.scene.mesh_colours import surface_of
+from mjsim.formats.scene.source_scene import HouseOptions, ScenePiece
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.house_ref import models_root
 from mjsim.house.compiled.house import compiled_house
+from mjsim.house.scene.scene import assemble
 from mjsim.house.validation.checked_model import Compiled
 from mjsim.importing.house.house_import import import_house
+from mjsim.importing.house.solids import make_solids
 from mjsim.values.errors import AssetError
+
+GROUND = (
+    "<model name='ground'><static>true</static><pose>0 0 -0.06 0 0 0</pose><link name='l'><visual name='v'><geometry>"
+    "<box><size>100 100 0.1</size></box></geometry></visual></link></model>"
+)
 
 
 def imported(tmp_path, source, **options):
@@ -115,6 +127,40 @@ def test_without_walls_the_house_is_the_rectangle_of_its_floor(tmp_path):
     decisions, catalogue = imported(tmp_path, write_sdf(tmp_path, walls=False))
     assert decisions["outline"].startswith("a rectangle")
     assert len(catalogue.rooms) == 1
+    bounds = np.reshape(compiled_house(catalogue).rooms.bounds, (2, 2))
+    np.testing.assert_allclose(np.ptp(bounds, axis=0), (8, 5), atol=0.4)
+
+
+def gapped(folder, monkeypatch, *missing):
+    """Write the flat without some of its walls, on a ground plane that extends far beyond it."""
+    monkeypatch.setattr(
+        house_scenes, "WALLS", {key: wall for key, wall in house_scenes.WALLS.items() if key not in missing}
+    )
+    return write_sdf(folder, extra="<include><uri>model://ground_plane</uri></include>" + GROUND)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("missing", "outside"), [(("north",), 0), (("north", "east"), 50)])
+def test_walls_that_do_not_close_do_not_take_in_the_ground(tmp_path, monkeypatch, missing, outside):
+    source = gapped(tmp_path, monkeypatch, *missing)
+    decisions, report = import_house(source, tmp_path / "house", HouseOptions())
+    (warning,) = report.findings
+    assert warning.rule == "outline" and warning.severity == "warning"
+    share = int(re.search(r"and (\d+) % of its floor is outside", warning.message)[1])
+    assert abs(share - outside) <= 8
+    assert next(d.choice for d in decisions if d.what == "outline") == "a rectangle"
+    house = compiled_house(Catalogue.load(str(tmp_path / "house")))
+    np.testing.assert_allclose(np.ptp(np.reshape(house.rooms.bounds, (2, 2)), axis=0), (8.2, 5.2), atol=0.3)
+    for receptacle in house.receptacles.values():
+        assert (receptacle.center[:2] > -0.2).all() and (receptacle.center[:2] < (8.2, 5.2)).all()
+
+
+@pytest.mark.slow
+def test_a_room_that_is_too_small_for_a_study_is_imported_with_warnings(tmp_path):
+    trimesh.creation.box((2.8, 2.5, 2.6)).export(tmp_path / "room.glb")
+    _, report = import_house(tmp_path / "room.glb", tmp_path / "house", HouseOptions())
+    assert {f.rule for f in report.findings} == {"area", "places"}
+    assert report.usable  # a warning does not refuse the house
 
 
 @pytest.mark.slow
@@ -210,6 +256,61 @@ def test_our_apartment_imports_with_its_rooms_and_its_floor(tmp_path):
         same = [np.linalg.norm(other.navigable.snap(p, np.inf) - p) < 0.03 for p in points]
         assert np.mean(same) >= 0.98
         assert np.mean([one.rooms.room_at(p) == other.rooms.room_at(p) for p in points]) >= 0.98
+
+
+def episode_glb(folder, name):
+    """Export a house with objects as one glTF file."""
+    catalogue = load_catalogue(name)
+    episode = sample_episode(catalogue, objects=6, seed=3, points=10)
+    (folder / "ours.glb").write_bytes(export_episode(assemble(episode, catalogue)))
+    return catalogue, folder / "ours.glb"
+
+
+@pytest.mark.slow
+def test_an_exported_house_comes_back_with_its_rooms_bins_and_floor(tmp_path):
+    catalogue, path = episode_glb(tmp_path, "generated:7?rooms=2")
+    decisions, back = imported(tmp_path, path)
+    ours, again = compiled_house(catalogue), compiled_house(back)
+    assert dict(back.rooms) == dict(catalogue.rooms)
+    assert decisions["collision"].endswith("boxes of 5 cm voxels")
+    for key, receptacle in ours.receptacles.items():
+        np.testing.assert_allclose(again.receptacles[key].center, receptacle.center, atol=2e-3)
+        assert back.receptacles[key].room == catalogue.receptacles[key].room
+    rng = np.random.default_rng(0)
+    points = np.array([ours.navigable.sample(rng) for _ in range(1000)])
+    same = [np.linalg.norm(again.navigable.snap(p, np.inf) - p) < 0.03 for p in points]
+    assert np.mean(same) >= 0.98  # the six objects on the floor were left out
+    assert np.mean([ours.rooms.room_at(p) == again.rooms.room_at(p) for p in points]) >= 0.98
+    assert decisions["loose things"].startswith("6 left out")
+
+
+@pytest.mark.parametrize(
+    ("marks", "reason"),
+    [
+        ({"parts": [{"key": "../x", "label": "X", "polygon": [[0, 0], [1, 0], [1, 1]]}]}, "damaged"),
+        ({"parts": [{"key": "x", "label": "X", "polygon": [[0, 0], [1, 0]]}]}, "has no floor"),
+        ({"bins": [{"key": "dish_bin"}]}, "damaged"),
+        ([], "damaged"),
+    ],
+)
+def test_damaged_marks_of_an_exported_house_are_refused(tmp_path, marks, reason):
+    whole = house_scenes.scene()
+    whole.graph.update("floor", metadata={"mjsim_house": marks})
+    whole.export(tmp_path / "flat.glb")
+    with pytest.raises(AssetError, match=reason):
+        import_house(tmp_path / "flat.glb", tmp_path / "out", HouseOptions())
+
+
+def test_boxes_that_touch_are_separate_bodies():
+    """Two stacked boxes share four edges, and a wall continues in a lower one."""
+    boxes = [
+        trimesh.creation.box((2, 0.2, h)).apply_translation((x, 0, h / 2))
+        for x, h in ((0, 2), (2, 2), (4, 1))
+    ]
+    boxes.append(trimesh.creation.box((2, 0.2, 0.5)).apply_translation((4, 0, 1.25)))
+    surface = surface_of(trimesh.util.concatenate(boxes), linear=False)
+    found = make_solids([ScenePiece("walls", surface)])
+    assert (found.boxes, found.hulls, found.voxels) == (4, 0, 0)
 
 
 PUBLIC = os.environ.get("MJSIM_PUBLIC_HOUSES", "")

@@ -140,6 +140,45 @@ REFUSED = {
 }  # fmt: skip
 
 
+def test_a_piece_of_three_points_is_a_thin_sheet(tmp_path):
+    """A triangle beside a box: filling its hole would close it without a volume."""
+    text = MAKE.box((0.1, 0.08, 0.06)).export(file_type="obj", header=None)
+    flap = "v 0.06 -0.02 0\nv 0.06 0.03 0\nv 0.06 0 0.03\nf 9 10 11\n"
+    item = take(tmp_path, f"{text}\n{flap}".encode(), ".obj")
+    np.testing.assert_allclose(item.size[0], 0.1105, atol=0.002)
+    assert report(item.decisions, "body").startswith("repaired: 2 pieces joined")
+
+
+def on_base(mesh, axis):
+    """Move the base of a mesh to the origin along an axis."""
+    offset = np.zeros(3)
+    offset[axis] = -mesh.bounds[0, axis]
+    return mesh.apply_translation(offset)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "up", "reason"),
+    [
+        (on_base(MAKE.box((0.08, 0.06, 0.2)), 2), "z", "its base is at z = 0"),  # a carton as it is scanned
+        (on_base(MAKE.box((0.08, 0.2, 0.06)), 1), "y", "most programs write OBJ with y up"),
+        (MAKE.box((0.2, 0.15, 0.04)), "z", "stands more steadily, up to a tilt of 7"),  # a bowl or a shoe
+        (MAKE.box((0.1, 0.1, 0.1)), "y", "most programs write OBJ with y up"),
+        (MAKE.box((0.2, 0.04, 0.15)), "y", "most programs write OBJ with y up"),
+    ],
+)
+def test_the_vertical_axis_of_an_obj_is_found_by_its_base_and_stability(tmp_path, mesh, up, reason):
+    item = take(tmp_path, mesh, ".obj")
+    assert report(item.decisions, "up").startswith(f"{up}: guessed")
+    assert reason in report(item.decisions, "up")
+    np.testing.assert_allclose(item.size[2], mesh.extents["xyz".index(up)], atol=1e-6)
+
+
+def test_a_given_axis_is_not_guessed(tmp_path):
+    item = take(tmp_path, MAKE.box((0.2, 0.15, 0.04)), ".obj", up="y")
+    assert report(item.decisions, "up") == "y: given"
+    assert item.size[2] == pytest.approx(0.15)
+
+
 @pytest.mark.parametrize("case", REFUSED)
 def test_unusable_files_are_refused_in_one_line(tmp_path, case):
     suffix, build, options, message = REFUSED[case]
