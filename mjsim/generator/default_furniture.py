@@ -98,12 +98,6 @@ FURNISHED_SHARES = {"hall": (0.15, 0.25), "living_room": (0.31, 0.38), "studio":
 COOKING: Options = ("kitchen", "living_room", "studio", "dining_room")
 DINING: Options = ("dining_room", "kitchen", "living_room", "studio")
 WORKING: Options = ("office", "child", "bedroom", "studio", "living_room", "dining_room", "hall")
-BIN_SIZES = {  # width, depth and height of bins on the floor, in metres
-    "recycling_bin": (0.48, 0.42, 0.5),
-    "laundry_hamper": (0.51, 0.51, 0.55),
-    "toy_box": (0.62, 0.47, 0.4),
-    "bookshelf": (0.9, 0.34, 0.75),
-}
 BIN_ROOMS: dict[str, Options] = {  # suitable room uses for each bin, in order of preference
     "recycling_bin": ("kitchen", "utility", "hall", "studio", "living_room", "dining_room"),
     "laundry_hamper": ("bathroom", "shower_room", "utility", "bedroom", "hall", "studio"),

@@ -9,7 +9,6 @@ import numpy as np
 from mjsim.generator.decorate import decorate
 from mjsim.generator.default_furniture import (
     BIN_ROOMS,
-    BIN_SIZES,
     COOKING,
     DEFAULTS,
     DINING,
@@ -26,8 +25,8 @@ from mjsim.generator.default_furniture import (
 from mjsim.generator.furniture.appearance import Appearance, draw_appearance
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.catalogue import KINDS
-from mjsim.generator.furniture.piece import Mount, Piece, flattened, moved
-from mjsim.generator.space import UNUSED, PiecePose, Space
+from mjsim.generator.furniture.piece import BIN_SIZES, Mount, Piece, flattened, moved
+from mjsim.generator.space import UNUSED, WALL_GAP, PiecePose, Space
 from mjsim.generator.values import BinPlacement, Furnishing, HomePlan, Palette, Placement, Rectangle, Side
 from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
@@ -73,7 +72,7 @@ class FurnishedHome:
         rng = stream(self.seed, "furniture", space.room.key, kind, str(number), str(self.attempt))
         for smaller in range(min(max(largest, self.attempt - 2), smallest), smallest + 1):
             for sides in AXES if kind == "lounge" else ((*AXES[0], *AXES[1]),):
-                fit = (space.depth(sides[0]), 0.0, 0.0) if kind == "lounge" else None
+                fit = (space.depth(sides[0]) - 2 * WALL_GAP, 0.0, 0.0) if kind == "lounge" else None
                 piece = KINDS[kind].make(rng, self.look, smaller=smaller, fit=fit)
                 avoid = space.corners if kind in AWAY_FROM_DOORS and self.attempt < 3 else ()
                 if (pose := space.put(piece, sides, avoid)) is not None:
@@ -93,7 +92,7 @@ class FurnishedHome:
 
     def put_bin(self, receptacle: str) -> bool:
         """Place a bin on the floor of the first room with enough space. Return False if no room has space."""
-        if receptacle not in BIN_SIZES:
+        if receptacle in ("dish_bin", "office_box"):
             return any(mount.receptacle == receptacle for mount in self.mounts)
         w, d, h = BIN_SIZES[receptacle]
         rng = stream(self.seed, "bin", receptacle, str(self.attempt))

@@ -1,5 +1,6 @@
 """Find furniture poses in a room that keep doors, windows and walkways clear."""
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -9,7 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.generator.furniture.piece import Piece, Spot, moved
+from mjsim.generator.furniture.drawn_boxes import Boxes, drawn_boxes
+from mjsim.generator.furniture.piece import Piece, Spot, intersect, moved, moved_boxes
+from mjsim.generator.shell import room_shell
 from mjsim.generator.values import BACK, SIDES, HomePlan, Room, Side
 
 # Lengths are in metres.
@@ -19,6 +22,7 @@ PERSON_RADII = (0.25, 0.265, 0.28, 0.29, 0.3)
 POCKET = 0.005  # maximum area of unreachable floor that is tolerated, in square metres
 STEP = 0.1  # distance between poses that are tried along a wall
 BESIDE = 0.6  # width of the floor next to a door that bins should avoid
+BESIDE_MIN = 0.36  # width of the floor next to a door that bins must avoid
 DOORWAY = 1.0  # maximum depth of the free floor in front of a door
 SNUG, APART = 0.09, 0.62  # range of gap widths that are avoided, because people would get stuck
 BEFORE_LEAF = 0.45  # depth of the free floor in front of an open door leaf
@@ -73,20 +77,24 @@ class Space:
     # Occupied parts of the walls as (side, start, end, bottom).
     hung: list[tuple[Side, float, float, float]] = field(default_factory=list)
     stood: list[tuple[Piece, PiecePose]] = field(default_factory=list)
+    beside: list[Spot] = field(default_factory=list)  # floor next to doors, which bins must avoid
+    drawn: Boxes = field(default_factory=lambda: np.empty((0, 6)))  # boxes of all drawn geoms in the room
     area: float = 0.0  # floor area covered by furniture, in square metres
 
     @classmethod
     def of(cls, plan: HomePlan, room: Room, rng: np.random.Generator) -> "Space":
         """Create the space for a room that contains no furniture yet."""
         space, floor = cls(room, rng), room.floor
+        space.drawn = drawn_boxes(room_shell(plan, room))
         for door in plan.doors_of(room.key):
             side, half = door.side_in(room.key), door.width / 2
             across = floor.depth if side in ("south", "north") else floor.width
             deep = min(DOORWAY, max(0.75, across - 0.3))
             zone = floor.along(side, door.center - half - 0.06, door.center + half + 0.06, 0, deep)
             space.keep.append((zone.x0, zone.y0, zone.x1, zone.y1))
-            zone = floor.along(side, door.center - half - BESIDE, door.center + half + BESIDE, 0, BESIDE)
-            space.corners.append((zone.x0, zone.y0, zone.x1, zone.y1))
+            for zones, wide in ((space.corners, BESIDE), (space.beside, BESIDE_MIN)):
+                zone = floor.along(side, door.center - half - wide, door.center + half + wide, 0, BESIDE)
+                zones.append((zone.x0, zone.y0, zone.x1, zone.y1))
             space.doors.append(floor.along(side, door.center, door.center, 0.42, 0.42).center)
             space.hung.append((side, door.center - half - 0.12, door.center + half + 0.12, 0.0))
             if door.leaf is not None and door.leaf.room == room.key:
@@ -120,25 +128,43 @@ class Space:
         places = self._free_poses() if free else self._wall_poses(piece, sides)
         if not len(places):
             return None
-        boxes, hits, uses = (
+        boxes, hits, uses, bins = (
             _moved(spots, places)
-            for spots in ([part.spot for part in piece.parts], [part.hit for part in piece.parts], piece.use)
+            for spots in (
+                [part.spot for part in piece.parts],
+                [part.hit for part in piece.parts],
+                piece.use,
+                [mount.spot for mount in piece.mounts],
+            )
         )
         tops = np.array([part.top for part in piece.parts])
         ok = self._fits(boxes, tops, uses, free) & ~_overlap(boxes, np.array(avoid).reshape(-1, 4))
+        ok &= ~_overlap(bins, np.array(self.beside).reshape(-1, 4))
         fits = np.flatnonzero(ok)
-        scores = self._scores(boxes[fits], free)
-        best: list[int] = fits[np.argsort(-scores, kind="stable")[:TRIES]].tolist()
-        for k in best:
+        order: list[int] = fits[np.argsort(-self._scores(boxes[fits], free), kind="stable")].tolist()
+        poses = ((k, self._pose(places[k], free)) for k in order)
+        for k, place in itertools.islice(((k, at) for k, at in poses if self.is_clear(piece, at)), TRIES):
             spots, hit, zones = ([_spot(box) for box in of[k].tolist()] for of in (boxes, hits, uses))
-            used = [] if piece.kind in UNUSED else spots
+            used = [] if piece.kind in UNUSED else [moved(s, place.x, place.y, place.yaw) for s in piece.reached]
             if self.connected(hit, zones, used):
                 self.near += used
-                x, y, turns, along = places[k].tolist()
-                place = PiecePose(x, y, int(turns), None if free else SIDES[int(turns)], along)
                 self.stand(piece, place, spots, zones, hit)
                 return place
         return None
+
+    def is_clear(self, piece: Piece, place: PiecePose) -> bool:
+        """Return True if what is drawn of a piece does not overlap anything that is drawn in the room."""
+        return not intersect(moved_boxes(piece.drawn, place.x, place.y, place.yaw), self.drawn)
+
+    def record(self, piece: Piece, place: PiecePose) -> None:
+        """Record a piece that takes up no floor at its final pose."""
+        self.stood.append((piece, place))
+        self.drawn = np.concatenate([self.drawn, moved_boxes(piece.drawn, place.x, place.y, place.yaw)])
+
+    @staticmethod
+    def _pose(row: Floats, free: bool) -> PiecePose:
+        x, y, turns, along = row.tolist()
+        return PiecePose(x, y, int(turns), None if free else SIDES[int(turns)], along)
 
     def stand(
         self,
@@ -154,7 +180,7 @@ class Space:
             self.hit.append(low)
             self.area += (low[2] - low[0]) * (low[3] - low[1])
         self.use.extend(zones)
-        self.stood.append((piece, place))
+        self.record(piece, place)
 
     def _wall_poses(self, piece: Piece, sides: Sequence[Side]) -> Floats:
         """Return all poses along the walls, in rows of x, y, quarter turns, and position along the wall."""

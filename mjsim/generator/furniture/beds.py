@@ -137,7 +137,7 @@ def bunk_bed(b: Builder) -> Piece:
     for z in (0.25, 1.3):
         b.box(paint, w, (0.01, d - 0.01), (z, z + 0.1))
         b.box("linen", w - 0.1, (0.04, d - 0.04), (z + 0.1, z + 0.22))
-        b.box(b.pick(*b.look.quilts), 1.4, (0.03, d - 0.03), (z + 0.12, z + 0.24), 0.27, seen=True)
+        b.box(b.pick(*b.look.quilts), 1.4, (0.03, d - 0.03), (z + 0.12, z + 0.24), 0.265, seen=True)
         b.soft("linen", (-0.72, d / 2, z + 0.25), (0.2, 0.32, 0.08))
     for y in (0.02, d - 0.045):
         for z in (1.55, 1.69):

@@ -5,7 +5,9 @@ import math
 from mjsim.generator.furniture import decoration, seats, storage, tables
 from mjsim.generator.furniture.artwork import painting
 from mjsim.generator.furniture.builder import Builder
-from mjsim.generator.furniture.piece import Piece, group
+from mjsim.generator.furniture.piece import Piece, group, pushed_in
+
+VIEW = (1.2, 3.4)  # range of distances from a television to a sofa at the opposite wall, in metres
 
 
 def television(b: Builder) -> Piece:
@@ -24,11 +26,14 @@ def television(b: Builder) -> Piece:
 
 
 def lounge(b: Builder) -> Piece:
+    """Create a television, a table and a sofa. If possible, they are `fit[0]` deep in total."""
     tv = television(Builder("television", b.rng, b.look))
     corner = b.smaller == 0 and b.chance(0.4)
     draw, name = (seats.corner_sofa, "corner_sofa") if corner else (seats.sofa, "sofa")
     sofa = draw(Builder(name, b.rng, b.look, b.smaller))
     deep, gap = tv.size[1], (b.pick(2.1, 2.4, 2.7), b.pick(2.0, 2.2), 1.7, 1.3)[min(b.smaller, 3)]
+    across = b.fit[0] - deep - sofa.size[1] if b.fit else 0.0
+    gap = across if VIEW[0] < across < VIEW[1] else gap
     back = deep + gap + sofa.size[1]
     members = [(tv, 0.0, 0.0, 0.0), (sofa, 0.0, back, math.pi)]
     front = back - sofa.size[1] if not corner else back - 0.92
@@ -63,7 +68,8 @@ def piano(b: Builder) -> Piece:
     b.image("linen", 0.34, (0.84, 1.05), 0.35, thick=0.006)
     b.clutter(0.8 * w, (0.08, 0.26), h, 2)
     base, stool = b.piece((w, d, h + 0.3), use=0.7), seats.stool(Builder("stool", b.rng, b.look))
-    return group(b.kind, [(base, 0, 0, 0), (stool, 0, d + 0.02, 0)], use=())
+    members = [(base, 0.0, 0.0, 0.0)]
+    return group(b.kind, [*members, pushed_in(members, stool, 0.0, d - 0.1, math.pi)], use=())
 
 
 def stove(b: Builder) -> Piece:

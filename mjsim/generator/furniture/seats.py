@@ -133,7 +133,7 @@ def dining_chair(b: Builder) -> Piece:
         b.soft(paint, (0, 0.06, 0.66), (0.21, 0.05, 0.2), (0.12, 0, 0))
         for x in (-0.15, 0.15):
             for y in (0.12, 0.42):
-                b.rod(b.pick(b.wood, b.metal), (1.2 * x, y, 0.0), (0.7 * x, 0.27, 0.43), 0.014)
+                b.rod(b.pick(b.wood, b.metal), (1.2 * x, y, 0.006), (0.7 * x, 0.27, 0.43), 0.014)
         return b.piece((w, d, h), seats=1)
     b.box(b.wood, w, (0.04, d), (0.42, 0.455), seen=True)
     b.legs(b.wood, w, (0.02, d), 0.42, 0.03, 0.018)

@@ -167,7 +167,7 @@ def display_cabinet(b: Builder) -> Piece:
         if i:
             b.box(paint, w - 0.06, (0.015, d - 0.05), (z, z + 0.015), seen=True)
         b.clutter(w - 0.15, (0.08, d - 0.1), z + 0.015, 2)
-    b.box("pane", w - 0.06, (d - 0.03, d - 0.022), (0.52, h - 0.04), seen=True)
+    b.box("pane", w - 0.06, (d - 0.03, d - 0.024), (0.52, h - 0.04), seen=True)
     b.box(paint, 0.03, (d - 0.03, d - 0.015), (0.5, h - 0.03), seen=True)
     return b.piece((w, d, h), use=0.62)
 

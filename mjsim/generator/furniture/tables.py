@@ -4,7 +4,7 @@ import math
 
 from mjsim.generator.furniture import seats
 from mjsim.generator.furniture.builder import Builder
-from mjsim.generator.furniture.piece import Mount, Piece, group
+from mjsim.generator.furniture.piece import Mount, Piece, group, pushed_in
 
 
 def _table(b: Builder, w: float, d: float, h: float) -> None:
@@ -19,7 +19,7 @@ def _table(b: Builder, w: float, d: float, h: float) -> None:
     elif form == "splayed":
         for x in (-w / 2 + 0.06, w / 2 - 0.06):
             for y in (0.06, d - 0.06):
-                b.rod(b.wood2, (x, y, 0), (0.82 * x, d / 2 + 0.7 * (y - d / 2), h - top), 0.022)
+                b.rod(b.wood2, (x, y, 0.008), (0.82 * x, d / 2 + 0.7 * (y - d / 2), h - top), 0.022)
     else:
         wood, radius = (b.wood, 0.035) if form == "blocks" else (b.pick(b.wood2, b.metal), 0.022)
         b.legs(wood, w, (0, d), h - top, 0.06, radius)
@@ -86,19 +86,16 @@ def dining(b: Builder) -> Piece:
             Builder("dining_chair", type(b.rng)(type(b.rng.bit_generator)(state)), b.look)
         )
 
-    out, members = 0.24, [(base, 0.0, 0.0, 0.0)]
-    each = 2 if w >= 1.15 and b.smaller < 2 else 1
-    if name == "round_table":
-        members += [(chair(), 0.0, -out, 0.0), (chair(), 0.0, d + out, math.pi)]
-        members += [(chair(), side * (w / 2 + out), d / 2, side * math.pi / 2) for side in (-1, 1)]
-    else:
-        for i in range(each):
-            x = (i + 0.5) * w / each - w / 2
-            members.append((chair(), x, d + out, math.pi))
-            if not against:
-                members.append((chair(), x, -out, 0.0))
-        if (w >= 1.5 and b.chance(0.5)) or b.smaller:
-            members += [(chair(), side * (w / 2 + out), d / 2, side * math.pi / 2) for side in (-1, 1)]
+    edges = []  # middle of each seat's table edge, and the direction in which a person sits there
+    each = 2 if w >= 1.15 and b.smaller < 2 and name == "table" else 1
+    for i in range(each):
+        x = (i + 0.5) * w / each - w / 2
+        edges += [(x, d, math.pi)] if against else [(x, d, math.pi), (x, 0.0, 0.0)]
+    if name == "round_table" or (w >= 1.5 and b.chance(0.5)) or b.smaller:
+        edges += [(side * w / 2, d / 2, side * math.pi / 2) for side in (-1, 1)]
+    members = [(base, 0.0, 0.0, 0.0)]
+    for edge in edges:
+        members.append(pushed_in(members, chair(), *edge))
     if b.chance(0.7):
         members.append((pendant_lamp(Builder("pendant_lamp", b.rng, b.look)), 0.0, d / 2 - 0.3, 0.0))
     return group(b.kind, members, use=(), stands="wall" if against else "free")
@@ -201,9 +198,9 @@ def desk(b: Builder) -> Piece:
     w, d, _ = base.size
     x = 0.22 if w > 1.1 else 0.25
     turn = math.pi + float(b.rng.uniform(-0.35, 0.35))
-    away = d - 0.06 + 0.56
     use = ((-w / 2, d, -w / 2 + 0.5, d + 0.72),)
-    return group(b.kind, [(base, 0, 0, 0), (chair, x + 0.28 * math.sin(turn), away, turn)], use=use)
+    members = [(base, 0.0, 0.0, 0.0)]
+    return group(b.kind, [*members, pushed_in(members, chair, x, d, turn)], use=use)
 
 
 def dressing_table(b: Builder) -> Piece:
@@ -234,9 +231,9 @@ def bar_table(b: Builder) -> Piece:
     b.legs(b.metal, w, (0, d), h - 0.04, 0.06, 0.025)
     b.box(b.metal, w - 0.12, (0.06, 0.09), (0.2, 0.23), seen=True)
     b.clutter(0.6 * w, (0.1, d - 0.1), h, 2)
-    base, members = b.piece((w, d, h + 0.25)), []
+    members = [(b.piece((w, d, h + 0.25)), 0.0, 0.0, 0.0)]
     state = int(b.rng.integers(2**31))
     for side in (-1, 1):
         stool = seats.bar_stool(Builder("bar_stool", type(b.rng)(type(b.rng.bit_generator)(state)), b.look))
-        members.append((stool, side * w / 4, d + 0.28, math.pi))
-    return group(b.kind, [(base, 0, 0, 0), *members], use=())
+        members.append(pushed_in(members, stool, side * w / 4, d, math.pi))
+    return group(b.kind, members, use=())

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 PREFIX = "generated:"
-VERSION = 3  # version of the home generator; any change that alters a generated home must increase it
+VERSION = 4  # version of the home generator; any change that alters a generated home must increase it
 ROOMS = (1, 10)  # minimum and maximum number of rooms in a generated home
 MAX_SEED = 2**63 - 1
 MAX_HOUSES = 100_000
