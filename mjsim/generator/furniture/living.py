@@ -128,7 +128,7 @@ def coat_rack(b: Builder) -> Piece:
                 b.rod(cloth, (x + u, 0.14, 1.46), (x + u, 0.14, 1.0), 0.03, shape="capsule")
     b.box("wicker", 0.3, (0.04, 0.22), (1.775, 1.9), -0.2 * w, seen=True)
     b.box(b.wood, w, (0.02, 0.24), (0.18, 0.2), seen=True)
-    b.legs(b.wood, w, (0.02, 0.24), 0.2, 0.02, 0.012)
+    b.legs(b.wood, w, (0.02, 0.24), 0.19, 0.02, 0.012)
     for i in range(count):
         x = w * ((i + 0.5) / count - 0.5)
         if b.chance(0.7):

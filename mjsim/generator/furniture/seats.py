@@ -46,7 +46,7 @@ def sofa(b: Builder) -> Piece:
     seat = w - 2 * wide
     low = 0.04 if b.chance(0.4) else 0.13
     b.box(b.cloth, seat, (0.02, d - 0.02), (low, 0.28))
-    b.box(b.cloth, seat, (0, 0.2), (low, back))
+    b.box(b.cloth, seat - 0.004, (0, 0.2), (low, back))
     if b.chance(0.5):
         b.rod(b.cloth, (-seat / 2 + 0.09, 0.1, back), (seat / 2 - 0.09, 0.1, back), 0.095, shape="capsule")
         back += 0.1
@@ -99,7 +99,7 @@ def armchair(b: Builder) -> Piece:
     wide = _arms(b, w, d, form, b.cloth)
     seat = w - 2 * wide
     b.box(b.cloth, seat, (0.03, d - 0.03), (0.13, 0.3))
-    b.box(b.cloth, seat, (0.0, 0.14), (0.13, back))
+    b.box(b.cloth, seat - 0.004, (0.0, 0.14), (0.13, back))
     b.rod(b.cloth, (0.06 - seat / 2, 0.07, back), (seat / 2 - 0.06, 0.07, back), 0.07, shape="capsule")
     b.box(b.cloth2, seat - 0.02, (0.14, d - 0.02), (0.3, 0.41))
     b.soft(b.cloth2, (0, d / 2 + 0.05, 0.41), (seat / 2 - 0.02, d / 2 - 0.12, 0.05))
@@ -143,7 +143,7 @@ def dining_chair(b: Builder) -> Piece:
         b.box(b.cloth, w - 0.08, (0.015, 0.06), (0.56, h - 0.02), seen=True)
         b.soft(b.cloth, (0, d / 2 + 0.02, 0.46), (w / 2 - 0.02, d / 2 - 0.04, 0.035))
         return b.piece((w, d, h), seats=1)
-    b.box(b.wood, w, (0.018, 0.052), (h - 0.1, h), seen=True)
+    b.box(b.wood, w, (0.018, 0.052), (h - 0.1, h + 0.003), seen=True)
     if form == "ladder":
         for z in (0.55, 0.68):
             b.box(b.wood, w - 0.06, (0.024, 0.046), (z, z + 0.05), seen=True)

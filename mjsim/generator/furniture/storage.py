@@ -71,7 +71,8 @@ def _shelf(b: Builder, w: float, h: float, d: float, columns: int, rows: int, ba
         b.box(frame, w, (0, 0.012), (0, h), seen=True)
     for i in range(columns + 1):
         x = -w / 2 + 0.012 + (w - 0.024) * i / columns
-        b.box(frame, 0.024, (0.012, d), (0, h), x, seen=True)
+        top = h - 0.01 if 0 < i < columns else h
+        b.box(frame, 0.024, (0.012, d), (0, top), x, seen=True)
     step = (h - 0.08) / rows
     for j in range(rows + 1):
         z = 0.06 if j == 0 else h - 0.02 if j == rows else 0.06 + step * j
@@ -167,7 +168,7 @@ def display_cabinet(b: Builder) -> Piece:
         if i:
             b.box(paint, w - 0.06, (0.015, d - 0.05), (z, z + 0.015), seen=True)
         b.clutter(w - 0.15, (0.08, d - 0.1), z + 0.015, 2)
-    b.box("pane", w - 0.06, (d - 0.03, d - 0.024), (0.52, h - 0.04), seen=True)
+    b.box("pane", w - 0.06, (d - 0.028, d - 0.022), (0.52, h - 0.04), seen=True)
     b.box(paint, 0.03, (d - 0.03, d - 0.015), (0.5, h - 0.03), seen=True)
     return b.piece((w, d, h), use=0.62)
 

@@ -145,7 +145,7 @@ def console(b: Builder) -> Piece:
     b.fronts(b.wood2, w, (h - 0.12, h - 0.02), d - 0.02 - 0.002, b.pick(2, 3))
     b.legs(b.wood, w, (0, d - 0.02), h - 0.13, 0.04, 0.02)
     if b.chance(0.6):
-        b.box(b.wood, w - 0.06, (0.02, d - 0.04), (0.15, 0.17), seen=True)
+        b.box(b.wood, w - 0.06, (0.025, d - 0.045), (0.15, 0.17), seen=True)
         b.box("wicker", 0.34, (0.04, d - 0.06), (0.17, 0.36), -0.2, seen=True)
     b.lamp(-w / 2 + 0.18, d / 2 - 0.02, h)
     b.clutter(0.4 * w, (0.08, d - 0.08), h, 1)
