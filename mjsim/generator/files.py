@@ -12,6 +12,7 @@ from mjsim.generator.recipe import RECIPE, Recipe
 from mjsim.generator.shell import shell
 from mjsim.generator.values import Asset, Furnishing
 from mjsim.support.toml import read_toml
+from mjsim.values.episode import FLOOR_SHARE
 
 # Model that provides default classes, materials, categories and objects for all generated houses.
 STYLE = "houses/apartment"
@@ -88,6 +89,8 @@ def _furniture(furnishing: Furnishing) -> Iterable[str]:
             f'<body name="{placed.room}/{placed.name}_{number}" pos="{x:.4f} {y:.4f} {z:.4f}" euler="0 0 {yaw:.6f}">'
             f"{placed.geoms}</body>"
         )
+    for number, place in enumerate(furnishing.places):
+        yield f'<site name="place:{number}" class="mount" pos="{" ".join(f"{v:.4f}" for v in place)}"/>'
     for mount in furnishing.mounts:
         x, y, z = mount.position
         yaw = (mount.quarter_turns + 2) % 4 * math.pi / 2
@@ -121,7 +124,10 @@ def used_materials(world: str, own: list[str], brought: Iterable[Asset], models:
 
 def _catalogue(recipe: Recipe, furnishing: Furnishing, models: Path) -> str:
     plan = recipe.plan
-    points = max(POINTS[0], min(POINTS[1], math.floor(POINTS_PER_M2 * plan.area)))
+    on_floor = max(POINTS[0], math.floor(POINTS_PER_M2 * plan.area))
+    points = min(
+        POINTS[1], on_floor + min(len(furnishing.places), math.floor(on_floor / FLOOR_SHARE) - on_floor)
+    )
     source = read_toml(models / STYLE / "catalogue.toml")
     mounts = {mount.receptacle: mount for mount in furnishing.mounts}
     categories = {k: c for k, c in source["categories"].items() if c["receptacle"] in mounts}

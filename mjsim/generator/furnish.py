@@ -25,7 +25,7 @@ from mjsim.generator.default_furniture import (
 from mjsim.generator.furniture.appearance import Appearance, draw_appearance
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.catalogue import KINDS
-from mjsim.generator.furniture.piece import BIN_SIZES, Mount, Piece, flattened, moved
+from mjsim.generator.furniture.piece import BIN_SIZES, Mount, Piece, Point, flattened, moved, moved_point
 from mjsim.generator.space import UNUSED, WALL_GAP, PiecePose, Space
 from mjsim.generator.values import BinPlacement, Furnishing, HomePlan, Palette, Placement, Rectangle, Side
 from mjsim.house.catalogue.generated_names import stream
@@ -36,8 +36,13 @@ SIZES = 4  # number of sizes that are tried for each piece of furniture
 BARE = 0.285  # minimum covered share of a home's floor, below which more furniture is added
 LEAST, MOST = 0.26, 0.44  # minimum and maximum share of the floor that furniture covers
 MAX_FAILURES = 4  # number of failed placements after which a room counts as full
+PLACES_APART = 0.6  # minimum distance between places for objects on furniture, in metres
+FROM_BIN = 1.0  # minimum distance between such a place and a bin, in metres
+HIGHEST_PLACE = 1.1  # maximum height of such a place, in metres
 # A wash corner has a screen that would block a door, and a kitchenette has a cooker, so both avoid doors.
 AWAY_FROM_DOORS = ("wash_corner", "kitchenette")
+# Distances of a television from the middle of the seats that face it, in metres.
+ASIDE = (0.0, 0.4, -0.4, 0.8, -0.8)
 AXES: tuple[tuple[Side, ...], ...] = (("south", "north"), ("east", "west"))
 
 
@@ -70,9 +75,17 @@ class FurnishedHome:
     ) -> bool:
         """Place the largest version of a furniture type that fits into a room. Return False if none fits."""
         rng = stream(self.seed, "furniture", space.room.key, kind, str(number), str(self.attempt))
+        fits = (
+            [(sides, None) for sides in ((*AXES[0], *AXES[1]),)]
+            if kind != "lounge"
+            else [
+                (sides, (space.depth(sides[0]) - 2 * WALL_GAP, aside, 0.0))
+                for aside in ASIDE
+                for sides in AXES
+            ]
+        )
         for smaller in range(min(max(largest, self.attempt - 2), smallest), smallest + 1):
-            for sides in AXES if kind == "lounge" else ((*AXES[0], *AXES[1]),):
-                fit = (space.depth(sides[0]) - 2 * WALL_GAP, 0.0, 0.0) if kind == "lounge" else None
+            for sides, fit in fits:
                 piece = KINDS[kind].make(rng, self.look, smaller=smaller, fit=fit)
                 avoid = space.corners if kind in AWAY_FROM_DOORS and self.attempt < 3 else ()
                 if (pose := space.put(piece, sides, avoid)) is not None:
@@ -121,11 +134,13 @@ class FurnishedHome:
                 self._put_any(space, required[i])
             if self.attempt < 3 and self.uses[space.room.key] in ("bedroom", "child", "studio"):
                 self.put(space, "wardrobe" if space.rng.random() < 0.6 else "mirror_wardrobe")
-        self._put_first(("dining", "bar_table"), DINING, "a table")
-        steps = [self._put_lounges, self._put_bins]
+        steps = [self._put_lounges, self._put_table, self._put_bins]
         for step in steps[::-1] if self.attempt % 2 else steps:
             step()
         self._put_seats(sum(space.room.use in ("bedroom", "studio") for space in self.spaces) + 1)
+
+    def _put_table(self) -> None:
+        self._put_first(("dining", "bar_table"), DINING, "a table")
 
     def _put_bins(self) -> None:
         if "office_box" in self.bins:
@@ -163,7 +178,7 @@ class FurnishedHome:
 
     def _put_lounges(self) -> None:
         for space in self.rooms(("living_room", "studio")):
-            if space.room.floor.area >= 9 and self.put(space, "lounge", smallest=2):
+            if space.room.floor.area >= 9 and self.put(space, "lounge"):
                 continue
             if not self.put(space, "sofa"):
                 self.put(space, "armchair")
@@ -219,7 +234,19 @@ class FurnishedHome:
             for piece, pose in space.stood
             for placement in placed(space.room.key, piece, pose, self.look)
         ]
-        return Furnishing(tuple(placements), tuple(self.mounts))
+        return Furnishing(tuple(placements), tuple(self.mounts), self._places())
+
+    def _places(self) -> tuple[Point, ...]:
+        """Return the places on furniture for objects, which are apart from each other and from the bins."""
+        bins, found = [mount.position for mount in self.mounts], list[Point]()
+        for space in self.spaces:
+            for piece, pose in space.stood:
+                for place in (moved_point(at, pose.x, pose.y, pose.yaw) for at in piece.places):
+                    apart = all(math.dist(place[:2], other[:2]) >= PLACES_APART for other in found)
+                    apart &= all(math.dist(place[:2], other[:2]) >= FROM_BIN for other in bins)
+                    if apart and place[2] <= HIGHEST_PLACE and space.can_take(place):
+                        found.append(place)
+        return tuple(found)
 
 
 def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> Furnishing:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.generator.furniture.drawn_boxes import Boxes, drawn_boxes
-from mjsim.generator.furniture.piece import Piece, Spot, intersect, moved, moved_boxes
+from mjsim.generator.furniture.piece import Piece, Point, Spot, intersect, moved, moved_boxes
 from mjsim.generator.shell import room_shell
 from mjsim.generator.values import BACK, SIDES, HomePlan, Room, Side
 
@@ -35,6 +35,8 @@ BLINDS = ("kitchen", "bathroom", "shower_room", "utility")  # room uses with bli
 AROUND = 0.76  # width of the free floor around a free-standing piece
 NEAR = BODY + 0.15  # maximum distance between a person's centre and a piece that the person uses
 UNUSED = ("radiator", "floor_lamp", "bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
+STANDING = 0.25  # radius of the free floor around a person who takes an object from furniture
+WITHIN = 0.65  # maximum distance between such a person's centre and the object
 TRIES = 14  # maximum number of poses per piece for which walkways are checked
 _CELL, _FINE = 0.05, 0.0125  # cell sizes of the grids that detect blocked walkways and unreachable floor
 
@@ -145,7 +147,9 @@ class Space:
         poses = ((k, self._pose(places[k], free)) for k in order)
         for k, place in itertools.islice(((k, at) for k, at in poses if self.is_clear(piece, at)), TRIES):
             spots, hit, zones = ([_spot(box) for box in of[k].tolist()] for of in (boxes, hits, uses))
-            used = [] if piece.kind in UNUSED else [moved(s, place.x, place.y, place.yaw) for s in piece.reached]
+            used = (
+                [] if piece.kind in UNUSED else [moved(s, place.x, place.y, place.yaw) for s in piece.reached]
+            )
             if self.connected(hit, zones, used):
                 self.near += used
                 self.stand(piece, place, spots, zones, hit)
@@ -155,6 +159,18 @@ class Space:
     def is_clear(self, piece: Piece, place: PiecePose) -> bool:
         """Return True if what is drawn of a piece does not overlap anything that is drawn in the room."""
         return not intersect(moved_boxes(piece.drawn, place.x, place.y, place.yaw), self.drawn)
+
+    def can_take(self, place: Point) -> bool:
+        """Return True if a person can take an object from a place on furniture without bending around things."""
+        floor, free = self.room.floor, self._distance(self.hit, _FINE) > STANDING
+        cells = (np.argwhere(free) - 0.5) * _FINE + (floor.x0, floor.y0)
+        away = np.hypot(*(cells - place[:2]).T)
+        if not len(away) or away.min() > WITHIN:
+            return False
+        steps = np.linspace(0.0, 1.0, 9)[:, None]
+        hand = np.hstack([place[:2] + steps * (cells[away.argmin()] - place[:2]), np.full((9, 1), place[2])])
+        low, high = hand + (-0.06, -0.06, 0.01), hand + (0.06, 0.06, 0.3)
+        return not intersect(np.hstack([low, high]), self.drawn)
 
     def record(self, piece: Piece, place: PiecePose) -> None:
         """Record a piece that takes up no floor at its final pose."""

@@ -172,7 +172,8 @@ def washing_machine(b: Builder) -> Piece:
     b.shadow(0.6, (0, 0.6))
     _machine(b, 0, b.pick("dark", "black"))
     if b.chance(0.5):
-        b.box("wicker", 0.4, (0.12, 0.4), (0.85, 1.03), seen=True)
+        b.box("wicker", 0.26, (0.12, 0.4), (0.85, 1.03), -0.15, seen=True)
+        b.places.append((0.11, 0.36, 0.85))
     else:
         b.box("towel_a", 0.28, (0.12, 0.44), (0.85, 0.91), 0.1, seen=True)
         b.box("towel_white", 0.26, (0.13, 0.43), (0.911, 0.97), 0.1, seen=True)

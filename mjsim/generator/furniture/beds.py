@@ -33,8 +33,9 @@ def _mattress(b: Builder, w: float, y: tuple[float, float], z: float, pillows: i
     start = y[0] + b.pick(0.45, 0.55, 0.62)
     # Avoid quilt_c, whose texture would look stretched on the narrow sides of the bed.
     side = "quilt_a" if quilt == "quilt_c" else quilt
-    b.box(side, w + 0.01, (start, y[1] - 0.005), (z + 0.05, z + 0.205), seen=True)
-    b.box(quilt, w + 0.01, (start, y[1] - 0.005), (z + 0.205, z + 0.215), seen=True)
+    b.box(side, w + 0.01, (start, y[1] - 0.005), (z + 0.05, z + 0.205))
+    b.box(quilt, w + 0.01, (start, y[1] - 0.005), (z + 0.205, z + 0.215))
+    b.places += [(x, y[0] + 1.15, z + 0.215) for x in (w / 2 - 0.22, 0.22 - w / 2)]
     if b.chance(0.5):
         half = w / 2 - 0.05
         b.rod("linen", (-half, start, z + 0.19), (half, start, z + 0.19), 0.045, shape="capsule")
@@ -89,7 +90,7 @@ def bedside_table(b: Builder) -> Piece:
     if b.chance(0.65):
         b.lamp(0.03, d / 2 - 0.03, h)
     else:
-        b.clutter(w, (0.08, d - 0.08), h, 1)
+        b.top(w, (0, d - 0.035), h)
     return b.piece((w, d, h + 0.4))
 
 
@@ -123,6 +124,7 @@ def day_bed(b: Builder) -> Piece:
         b.box(b.wood, 0.04, (0, d), (0.1, 0.68), side * (w / 2 - 0.02))
     b.box(b.wood, w, (0, 0.04), (0.1, 0.75))
     b.box(b.pick(*b.look.quilts), w - 0.09, (0.045, d - 0.01), (0.3, 0.45))
+    b.places += [(x, d - 0.21, 0.45) for x in (-0.5, 0.5)]
     for i in range(3):
         b.pillow(b.pick(*b.look.cloths), (0.6 * (i - 1), 0.16, 0.62), (0.26, 0.09, 0.2), -0.25)
     return b.piece((w, d, 0.84), use=0.7, seats=2)

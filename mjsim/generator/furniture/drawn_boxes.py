@@ -8,7 +8,10 @@ from numpy.typing import NDArray
 
 Boxes = NDArray[np.float64]  # rows of x0, y0, z0, x1, y1, z1 in metres, shape (n, 6)
 _HIDDEN = ("guard", "shadow")  # default classes of geoms that are not drawn as solids
-_AXES = {"x": "0 1 0 0 0 1", "y": "1 0 0 0 0 1"}  # axes of the default classes for walls, by the end of their names
+_AXES = {
+    "x": "0 1 0 0 0 1",
+    "y": "1 0 0 0 0 1",
+}  # axes of the default classes for walls, by the end of their names
 
 
 def drawn_boxes(geoms: str) -> Boxes:

@@ -26,33 +26,37 @@ def television(b: Builder) -> Piece:
 
 
 def lounge(b: Builder) -> Piece:
-    """Create a television, a table and a sofa. If possible, they are `fit[0]` deep in total."""
-    tv = television(Builder("television", b.rng, b.look))
+    """Create seats around a table that face a television or stove, which is `fit[1]` beside their middle.
+
+    If the distance allows it, the seats stand at the opposite wall, which is `fit[0]` away.
+    """
+    name, draw = ("stove", stove) if b.chance(0.2) else ("television", television)
+    focus = draw(Builder(name, b.rng, b.look))
     corner = b.smaller == 0 and b.chance(0.4)
     draw, name = (seats.corner_sofa, "corner_sofa") if corner else (seats.sofa, "sofa")
+    if b.smaller > 2:
+        draw, name = seats.armchair, "armchair"
     sofa = draw(Builder(name, b.rng, b.look, b.smaller))
-    deep, gap = tv.size[1], (b.pick(2.1, 2.4, 2.7), b.pick(2.0, 2.2), 1.7, 1.3)[min(b.smaller, 3)]
-    across = b.fit[0] - deep - sofa.size[1] if b.fit else 0.0
+    deep, gap = focus.size[1], (b.pick(2.1, 2.4, 2.7), b.pick(2.0, 2.2), 1.7, 1.4)[min(b.smaller, 3)]
+    depth, aside, _ = b.fit or (0.0, 0.0, 0.0)
+    across = depth - deep - sofa.size[1]
     gap = across if VIEW[0] < across < VIEW[1] else gap
     back = deep + gap + sofa.size[1]
-    members = [(tv, 0.0, 0.0, 0.0), (sofa, 0.0, back, math.pi)]
+    members = [(focus, aside, 0.0, 0.0), (sofa, 0.0, back, math.pi)]
     front = back - sofa.size[1] if not corner else back - 0.92
-    if b.smaller < 2:
-        table = tables.coffee_table(Builder("coffee_table", b.rng, b.look, b.smaller))
-        y = front - 0.64 - table.size[1] if not corner else front - 0.66 - table.size[1]
-        x = 0.0
-        if corner:
-            long = sofa.parts[1].spot
-            # The sofa is rotated by half a turn, which swaps left and right.
-            side = 1 if long[0] + long[2] < 0 else -1
-            x = -side * 0.46
-        if y - deep > 0.7:
-            members.append((table, x, y, 0.0))
-    if b.smaller < 3 and b.chance(0.85):
+    table = tables.coffee_table(Builder("coffee_table", b.rng, b.look, b.smaller))
+    long = sofa.parts[-1].spot
+    # The sofa is rotated by half a turn, which swaps left and right.
+    x = math.copysign(0.46, long[0] + long[2]) if corner else 0.0
+    y = front - 0.64 - table.size[1]
+    if y - deep > 0.7:
+        members.append((table, x, y, 0.0))
+    if name != "armchair" and b.chance(0.85):
         wide, half = min(b.pick(2.0, 2.4), sofa.size[0]), min(gap / 2 - 0.1, b.pick(0.7, 0.85))
         rug = Builder("rug", b.rng, b.look, fit=(wide, 2 * half, 0.0))
         members.append((decoration.rug(rug), 0.0, (deep + front) / 2 + 0.25 - half, 0.0))
-    return group(b.kind, members, use=((-0.4, deep, 0.4, deep + 0.6),))
+    use = (aside - 0.4, deep, aside + 0.4, deep + 0.6)
+    return group(b.kind, members, use=(use,))
 
 
 def piano(b: Builder) -> Piece:

@@ -15,6 +15,7 @@ from mjsim.generator.furniture.drawn_boxes import Boxes, drawn_boxes
 from mjsim.generator.values import Asset
 
 Spot = tuple[float, float, float, float]  # rectangle on the floor (x0, y0, x1, y1), in metres
+Point = tuple[float, float, float]
 PUSHED = (0.24, 0.3, 0.36, 0.42, 0.5, 0.58)  # distances of a seat's back from a table's edge, in metres
 SLACK = 0.003  # depth by which drawn geoms may overlap, such as table legs on a rug, in metres
 BIN_SIZES = {  # width, depth and height of bins, in metres
@@ -87,6 +88,7 @@ class Piece:
     seats: int = 0
     mounts: tuple[Mount, ...] = ()
     pictures: tuple[DrawnTexture, ...] = ()
+    places: tuple[Point, ...] = ()  # free positions on top of the piece where objects can lie, in metres
     members: tuple["Member", ...] = ()  # members of a group; a group has no geoms
 
     @property
@@ -120,6 +122,11 @@ def moved(spot: Spot, x: float, y: float, yaw: float) -> Spot:
     xs = [round(x + cos * u - sin * v, 4) for u, v in corners]
     ys = [round(y + sin * u + cos * v, 4) for u, v in corners]
     return min(xs), min(ys), max(xs), max(ys)
+
+
+def moved_point(point: Point, x: float, y: float, yaw: float) -> Point:
+    u, v, _, _ = moved((*point[:2], *point[:2]), x, y, yaw)
+    return u, v, point[2]
 
 
 def moved_boxes(boxes: Boxes, x: float, y: float, yaw: float) -> Boxes:
@@ -183,8 +190,9 @@ def group(
     mounts = []
     for p, x, y, yaw in members:
         for mount in p.mounts:
-            u, v, _, _ = moved((*mount.position[:2], *mount.position[:2]), x + dx, y + dy, yaw)
-            mounts.append(Mount(mount.receptacle, (u, v, mount.position[2]), mount.yaw + yaw))
+            at = moved_point(mount.position, x + dx, y + dy, yaw)
+            mounts.append(Mount(mount.receptacle, at, mount.yaw + yaw))
+    places = [moved_point(at, x + dx, y + dy, yaw) for p, x, y, yaw in members for at in p.places]
     return Piece(
         kind,
         (right - left, front - back, max(p.size[2] for p, *_ in members)),
@@ -194,6 +202,7 @@ def group(
         stands,
         sum(p.seats for p, *_ in members) if seats is None else seats,
         tuple(mounts),
+        places=tuple(places),
         members=tuple((p, x + dx, y + dy, yaw) for p, x, y, yaw in members),
     )
 

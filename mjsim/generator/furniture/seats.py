@@ -26,7 +26,8 @@ def _cushions(b: Builder, w: float, y: tuple[float, float], count: int, cloth: s
     wide = w / count
     for i in range(count):
         u = x + w * ((i + 0.5) / count - 0.5)
-        b.box(cloth, wide - 0.012, y, (0.28, 0.42), u)
+        b.box(cloth, wide - 0.012, y, (0.28, 0.45), u)
+        b.places.append((u, y[1] - 0.2, 0.45))
         b.soft(cloth, (u, sum(y) / 2, 0.42), (wide / 2 - 0.01, (y[1] - y[0]) / 2 - 0.01, 0.045))
         b.pillow(cloth, (u, y[0] + 0.07, 0.62), (wide / 2 - 0.015, 0.11, 0.2), -0.18)
 
@@ -198,7 +199,8 @@ def bench(b: Builder) -> Piece:
             b.box(b.wood, w - 0.02, (0.02, d - 0.02), (0.06, 0.08), seen=True)
             for x in (-w / 4, w / 4):
                 b.box("wicker", w / 2 - 0.12, (0.05, d - 0.04), (0.08, 0.28), x, seen=True)
-    b.box(b.cloth, w - 0.03, (0.015, d - 0.015), (h - 0.04, h + 0.02), seen=True)
+    b.box(b.cloth, w - 0.03, (0.015, d - 0.015), (h - 0.04, h + 0.02))
+    b.places += [(x, d / 2, h + 0.02) for x in (0.19 - w / 2, w / 2 - 0.19)]
     return b.piece((w, d, h + 0.02), use=0.62, seats=2)
 
 

@@ -42,7 +42,7 @@ def chest_of_drawers(b: Builder) -> Piece:
         b.legs(b.wood, w, (0, d - 0.03), low, 0.05, 0.02)
     fronts, columns = b.pick(carcass, b.wood2), 1 if w < 0.85 else 2
     b.fronts(fronts, w, (low + 0.03, h - 0.025), d - 0.035, columns, b.pick(3, 4))
-    b.clutter(0.8 * w, (0.1, d - 0.1), h)
+    b.top(w, (0, d - 0.035), h)
     return b.piece((w, d, h + 0.3), use=0.65)
 
 
@@ -82,7 +82,7 @@ def _shelf(b: Builder, w: float, h: float, d: float, columns: int, rows: int, ba
             wide = w / columns - 0.05
             _filled(b, wide, 0.08 + step * j, step - 0.03, d, -w / 2 + w * (i + 0.5) / columns)
     if h < 1.4:
-        b.clutter(0.8 * w, (0.06, d - 0.06), h)
+        b.top(w, (0, d), h)
         h += 0.3
     return b.piece((w, d, h), use=0.6)
 
@@ -126,7 +126,7 @@ def sideboard(b: Builder) -> Piece:
     for i in (-1, 1):
         b.fronts(fronts, third, (low + 0.02, h - 0.02), d - 0.035, 1, 1, i * third, doors=True)
     b.fronts(fronts, third, (low + 0.02, h - 0.02), d - 0.035, 1, 3)
-    b.clutter(0.85 * w, (0.1, d - 0.12), h, 4)
+    b.top(w, (0, d - 0.035), h)
     return b.piece((w, d, h + 0.3), use=0.65)
 
 
@@ -205,7 +205,7 @@ def filing_cabinet(b: Builder) -> Piece:
     b.box(paint, w, (0, d - 0.035), (0, h))
     b.handle = "bar"
     b.fronts(paint, w, (0.03, h - 0.02), d - 0.035, 1, round(h / 0.33))
-    b.clutter(w, (0.1, d - 0.1), h, 1)
+    b.top(w, (0, d - 0.035), h)
     return b.piece((w, d, h + 0.3), use=0.62)
 
 
@@ -219,7 +219,9 @@ def trunk(b: Builder) -> Piece:
         b.box(b.metal, 0.05, (d - 0.012, d - 0.002), (0, h - 0.07), x, seen=True)
     if b.chance(0.5):
         b.soft(b.cloth, (0, d / 2, h), (w / 2 - 0.03, d / 2 - 0.03, 0.04))
-    return b.piece((w, d, h + 0.05), use=0.6, seats=1)
+    else:
+        b.top(w, (0, d), h)
+    return b.piece((w, d, h + 0.3), use=0.6, seats=1)
 
 
 def toy_shelf(b: Builder) -> Piece:

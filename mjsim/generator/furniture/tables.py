@@ -47,6 +47,7 @@ def _laid(b: Builder, w: float, y: float) -> None:
     if b.chance(0.5):
         b.box(b.pick("linen", b.cloth2), 0.6 * w, (y - 0.16, y + 0.16), (0.74, 0.743), seen=True)
     b.clutter(0.5 * w, (y - 0.1, y + 0.1), 0.744, 2)
+    b.places += [(side * (w / 2 - 0.19), y, 0.74) for side in (-1, 1)]
 
 
 def round_table(b: Builder) -> Piece:
@@ -54,6 +55,7 @@ def round_table(b: Builder) -> Piece:
     b.shadow(2 * r, (0, 2 * r), round_one=True)
     _round(b, r, 0.74)
     b.clutter(0.3, (r - 0.1, r + 0.1), 0.74, 1)
+    b.places += [(0.5 * r * u, r + 0.5 * r * v, 0.74) for u in (-1, 1) for v in (-1, 1)]
     return b.piece((2 * r, 2 * r, 1.1), stands="free")
 
 
@@ -107,7 +109,8 @@ def coffee_table(b: Builder) -> Piece:
         r = b.pick(0.35, 0.42)
         b.shadow(2 * r, (0, 2 * r), round_one=True)
         _round(b, r, h)
-        b.clutter(0.3, (r - 0.1, r + 0.1), h, 1)
+        b.clutter(0.1, (r - 0.1, r + 0.1), h, 1, -0.4 * r)
+        b.places.append((0.4 * r, r, h))
         return b.piece((2 * r, 2 * r, h + 0.3), stands="free")
     w, d = b.size(0.8, 1.2, 0.1), b.pick(0.5, 0.6)
     b.shadow(w, (0, d))
@@ -119,7 +122,7 @@ def coffee_table(b: Builder) -> Piece:
         b.legs(b.pick(b.wood, b.metal), w, (0, d), h - 0.035, 0.05, 0.022)
         if form == "shelf":
             b.box(b.wood, w - 0.1, (0.05, d - 0.05), (0.12, 0.14), seen=True)
-    b.clutter(0.8 * w, (d / 2 - 0.1, d / 2 + 0.1), h, 2)
+    b.top(w, (0, d), h)
     return b.piece((w, d, h + 0.3), stands="free")
 
 
@@ -134,7 +137,7 @@ def side_table(b: Builder) -> Piece:
     if b.chance(0.6):
         b.lamp(0, r, h)
     else:
-        b.clutter(0.2, (r - 0.05, r + 0.05), h, 1)
+        b.top(2 * r, (0, 2 * r), h)
     return b.piece((2 * r, 2 * r, h + 0.4))
 
 
@@ -148,7 +151,7 @@ def console(b: Builder) -> Piece:
         b.box(b.wood, w - 0.06, (0.025, d - 0.045), (0.15, 0.17), seen=True)
         b.box("wicker", 0.34, (0.04, d - 0.06), (0.17, 0.36), -0.2, seen=True)
     b.lamp(-w / 2 + 0.18, d / 2 - 0.02, h)
-    b.clutter(0.4 * w, (0.08, d - 0.08), h, 1)
+    b.top(w - 0.36, (0, d - 0.02), h, 0.18)
     return b.piece((w, d, h + 0.4), use=0.62)
 
 
@@ -189,6 +192,7 @@ def _desk(b: Builder) -> Piece:
     if b.chance(0.6) and w > 1.1:
         b.post(b.pick(*b.look.accents), seat + 0.34, 0.2, (h, h + 0.1), 0.035)
     mount = Mount("office_box", (x, d / 2 - 0.02, h))
+    b.places += [mount.position, (w / 2 - 0.19, d - 0.19, h)] if w > 1.5 else [mount.position]
     return b.piece((w, d, 1.22), mounts=(mount,), seats=0)
 
 
@@ -230,7 +234,7 @@ def bar_table(b: Builder) -> Piece:
     b.box(b.pick(b.wood, "stone"), w, (0, d), (h - 0.04, h))
     b.legs(b.metal, w, (0, d), h - 0.04, 0.06, 0.025)
     b.box(b.metal, w - 0.12, (0.06, 0.09), (0.2, 0.23), seen=True)
-    b.clutter(0.6 * w, (0.1, d - 0.1), h, 2)
+    b.top(w, (0, d), h)
     members = [(b.piece((w, d, h + 0.25)), 0.0, 0.0, 0.0)]
     state = int(b.rng.integers(2**31))
     for side in (-1, 1):

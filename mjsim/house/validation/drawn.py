@@ -1,7 +1,7 @@
 """Measure drawn geometry that overlaps, or that flickers because two faces are in the same place."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -78,6 +78,16 @@ def coplanar_faces(compiled: Compiled) -> list[DrawnFault]:
                     found.append(DrawnFault(int(geoms[i]), int(geoms[j]), float(area[i, j]), place))
                     break
     return found
+
+
+def describe(compiled: Compiled, faults: Sequence[DrawnFault], scale: float, unit: str) -> str:
+    """Summarize faults for a report: their number, and the largest with the names of its bodies."""
+    if not faults:
+        return "none"
+    worst = max(faults, key=lambda fault: fault.amount)
+    bodies = compiled.model.geom_bodyid[[worst.first, worst.second]].tolist()
+    names = " and ".join(dict.fromkeys(compiled.model.body(body).name for body in bodies))
+    return f"{len(faults)}, at most {scale * worst.amount:.0f} {unit}: {names}"
 
 
 def _drawn(compiled: Compiled) -> NDArray[np.intp]:
