@@ -8,7 +8,8 @@ import numpy as np
 from mjsim.generator.furniture.appearance import Appearance
 from mjsim.generator.furniture.catalogue import KINDS
 from mjsim.generator.furniture.piece import Piece, Spot, flattened, moved
-from mjsim.generator.space import BLINDS, WALL_GAP, PiecePose, Space
+from mjsim.generator.poses import WALL_GAP
+from mjsim.generator.space import BLINDS, PiecePose, Space
 from mjsim.generator.values import BACK, SIDES, HomePlan, Side, Window
 from mjsim.house.catalogue.generated_names import stream
 

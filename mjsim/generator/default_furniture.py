@@ -25,7 +25,7 @@ DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
         (("toy_shelf", "low_bookcase", "cube_shelf"), 0.9),
         (("desk",), 0.6),
         (("pouf", "stool", "trunk", "aquarium"), 0.7),
-        (PLANTS, 0.4),
+        (PLANTS, 0.3),
     ),
     "living_room": (
         (("armchair",), 0.8),
@@ -35,7 +35,7 @@ DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
         (("sideboard", "piano", "stove", "aquarium", "chest_of_drawers"), 0.8),
         (("armchair", "pouf", "day_bed"), 0.6),
         ((*_SHELVES, "trunk", "console"), 0.7),
-        (PLANTS, 0.6),
+        (PLANTS, 0.3),
     ),
     "studio": (
         (("chest_of_drawers", "low_bookcase", "cube_shelf"), 1.0),
@@ -45,8 +45,8 @@ DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
     ),
     "kitchen": (
         (("bar_table", "larder", "dresser", "kitchen_trolley"), 0.9),
-        (("kitchen_trolley", "larder", "stool"), 0.7),
-        (PLANTS, 0.6),
+        (("bench", "stool"), 0.3),
+        (PLANTS, 0.4),
     ),
     "dining_room": (
         (("sideboard", "dresser", "display_cabinet"), 1.0),
@@ -83,7 +83,19 @@ DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
 }
 # Furniture for rooms in which nothing else fits.
 FALLBACKS: Options = ("standing_mirror", "umbrella_stand", "snake_plant", "stool")
-MAX_PLANTS = 3
+MAX_PLANTS = 2  # maximum number of plants per room
+# Maximum number of pieces per home; the default is no limit.
+MAX_IN_HOME = dict.fromkeys(
+    ("aquarium", "piano", "stove", "larder", "dresser", "kitchen_trolley", "cactus"), 1
+) | {
+    "bush": 2,
+    "tree": 2,
+    "palm": 2,
+    "fern_stand": 2,
+    "snake_plant": 2,
+    "pouf": 2,
+    "television": 2,
+}
 ROUNDS = 3  # number of passes through the lists of default furniture
 MAX_OF_KIND = {
     "armchair": 2,

@@ -11,6 +11,7 @@ from mjsim.generator.palette import surfaces
 from mjsim.generator.recipe import RECIPE, Recipe
 from mjsim.generator.shell import shell
 from mjsim.generator.values import Asset, Furnishing
+from mjsim.generator.views import landscapes
 from mjsim.support.toml import read_toml
 from mjsim.values.episode import FLOOR_SHARE
 
@@ -57,6 +58,7 @@ def house_files(recipe: Recipe, furnishing: Furnishing, models: Path) -> Mapping
     plan = recipe.plan
     world = "\n".join([*shell(plan), *_furniture(furnishing)])
     own = {asset.name: asset for placed in furnishing.placements for asset in placed.assets}
+    own |= {asset.name: asset for asset in landscapes(recipe.seed)}
     x0, x1 = min(r.floor.x0 for r in plan.rooms), max(r.floor.x1 for r in plan.rooms)
     y0, y1 = min(r.floor.y0 for r in plan.rooms), max(r.floor.y1 for r in plan.rooms)
     style = ET.parse(models / STYLE / "defaults.xml").getroot()

@@ -4,8 +4,6 @@ import itertools
 import math
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-
 from mjsim.generator.decorate import decorate
 from mjsim.generator.default_furniture import (
     BIN_ROOMS,
@@ -14,20 +12,22 @@ from mjsim.generator.default_furniture import (
     DINING,
     FALLBACKS,
     FURNISHED_SHARES,
+    MAX_IN_HOME,
     MAX_OF_KIND,
     MAX_PLANTS,
     PLANTS,
     REQUIRED,
     ROUNDS,
-    SHOWN_NAMES,
     WORKING,
 )  # fmt: skip
 from mjsim.generator.furniture.appearance import Appearance, draw_appearance
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.catalogue import KINDS
-from mjsim.generator.furniture.piece import BIN_SIZES, Mount, Piece, Point, flattened, moved, moved_point
-from mjsim.generator.space import UNUSED, WALL_GAP, PiecePose, Space
-from mjsim.generator.values import BinPlacement, Furnishing, HomePlan, Palette, Placement, Rectangle, Side
+from mjsim.generator.furniture.piece import BIN_SIZES, Mount, Piece, flattened, moved
+from mjsim.generator.placements import describe_place, placed, places_for_objects
+from mjsim.generator.poses import WALL_GAP
+from mjsim.generator.space import UNUSED, PiecePose, Space
+from mjsim.generator.values import BinPlacement, Furnishing, HomePlan, Palette, Side
 from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
@@ -36,9 +36,6 @@ SIZES = 4  # number of sizes that are tried for each piece of furniture
 BARE = 0.285  # minimum covered share of a home's floor, below which more furniture is added
 LEAST, MOST = 0.26, 0.44  # minimum and maximum share of the floor that furniture covers
 MAX_FAILURES = 4  # number of failed placements after which a room counts as full
-PLACES_APART = 0.6  # minimum distance between places for objects on furniture, in metres
-FROM_BIN = 1.0  # minimum distance between such a place and a bin, in metres
-HIGHEST_PLACE = 1.1  # maximum height of such a place, in metres
 # A wash corner has a screen that would block a door, and a kitchenette has a cooker, so both avoid doors.
 AWAY_FROM_DOORS = ("wash_corner", "kitchenette")
 # Distances of a television from the middle of the seats that face it, in metres.
@@ -59,6 +56,7 @@ class FurnishedHome:
         self.uses = {space.room.key: self._use(space) for space in self.spaces}
         self.mounts: list[BinPlacement] = []
         self.seats = 0
+        self.needed = sum(space.room.use in ("bedroom", "studio") for space in self.spaces) + 1
 
     def _use(self, space: Space) -> str:
         room = space.room
@@ -71,9 +69,19 @@ class FurnishedHome:
         return [space for use in uses for space in self.spaces if self.uses[space.room.key] == use]
 
     def put(
-        self, space: Space, kind: str, *, largest: int = 0, smallest: int = SIZES - 1, number: int = 0
+        self,
+        space: Space,
+        kind: str,
+        *,
+        largest: int = 0,
+        smallest: int = SIZES - 1,
+        number: int = 0,
+        seats: int = 0,
     ) -> bool:
-        """Place the largest version of a furniture type that fits into a room. Return False if none fits."""
+        """Place the largest version of a furniture type that fits into a room. Return False if none fits.
+
+        Versions with fewer than `seats` seats are not placed.
+        """
         rng = stream(self.seed, "furniture", space.room.key, kind, str(number), str(self.attempt))
         fits = (
             [(sides, None) for sides in ((*AXES[0], *AXES[1]),)]
@@ -88,7 +96,7 @@ class FurnishedHome:
             for sides, fit in fits:
                 piece = KINDS[kind].make(rng, self.look, smaller=smaller, fit=fit)
                 avoid = space.corners if kind in AWAY_FROM_DOORS and self.attempt < 3 else ()
-                if (pose := space.put(piece, sides, avoid)) is not None:
+                if piece.seats >= seats and (pose := space.put(piece, sides, avoid)) is not None:
                     self._record(space, piece, pose)
                     return True
         return False
@@ -100,7 +108,7 @@ class FurnishedHome:
             if key in self.bins and all(placed.receptacle != key for placed in self.mounts):
                 x, y, *_ = moved((*mount.position[:2], *mount.position[:2]), pose.x, pose.y, pose.yaw)
                 turns = (pose.turns + round((mount.yaw - math.pi) / (math.pi / 2))) % 4
-                place, position = _describe_place(space, piece, key), (x, y, mount.position[2])
+                place, position = describe_place(space, piece, key), (x, y, mount.position[2])
                 self.mounts.append(BinPlacement(key, space.room.key, place, position, turns))
 
     def put_bin(self, receptacle: str) -> bool:
@@ -137,9 +145,13 @@ class FurnishedHome:
         steps = [self._put_lounges, self._put_table, self._put_bins]
         for step in steps[::-1] if self.attempt % 2 else steps:
             step()
-        self._put_seats(sum(space.room.use in ("bedroom", "studio") for space in self.spaces) + 1)
+        self._put_seats(self.needed)
 
     def _put_table(self) -> None:
+        """Put a table with a seat for every sleeper and a guest into the home, or a smaller one if none fits."""
+        for seats, space in itertools.product((max(4, self.needed), self.needed), self.rooms(DINING)):
+            if self.put(space, "dining", number=seats, seats=seats):
+                return
         self._put_first(("dining", "bar_table"), DINING, "a table")
 
     def _put_bins(self) -> None:
@@ -218,12 +230,16 @@ class FurnishedHome:
                 failures += not self._put_one_more(space, order, number, again)
 
     def _put_one_more(self, space: Space, kinds: Sequence[str], number: int, more: int) -> bool:
-        there = [member.kind for piece, _ in space.stood for member, *_ in flattened(piece)]
+        there, home = (
+            [member.kind for other in spaces for piece, _ in other.stood for member, *_ in flattened(piece)]
+            for spaces in ([space], self.spaces)
+        )
         if kinds[0] in PLANTS and sum(kind in PLANTS for kind in there) >= MAX_PLANTS:
             return False
         for kind in kinds:
             most = MAX_OF_KIND.get(kind, 1) + (kind not in UNUSED) * more
-            if there.count(kind) < most and self.put(space, kind, smallest=1, number=number):
+            is_rare = home.count(kind) >= MAX_IN_HOME.get(kind, math.inf)
+            if there.count(kind) < most and not is_rare and self.put(space, kind, smallest=1, number=number):
                 return True
         return False
 
@@ -234,19 +250,7 @@ class FurnishedHome:
             for piece, pose in space.stood
             for placement in placed(space.room.key, piece, pose, self.look)
         ]
-        return Furnishing(tuple(placements), tuple(self.mounts), self._places())
-
-    def _places(self) -> tuple[Point, ...]:
-        """Return the places on furniture for objects, which are apart from each other and from the bins."""
-        bins, found = [mount.position for mount in self.mounts], list[Point]()
-        for space in self.spaces:
-            for piece, pose in space.stood:
-                for place in (moved_point(at, pose.x, pose.y, pose.yaw) for at in piece.places):
-                    apart = all(math.dist(place[:2], other[:2]) >= PLACES_APART for other in found)
-                    apart &= all(math.dist(place[:2], other[:2]) >= FROM_BIN for other in bins)
-                    if apart and place[2] <= HIGHEST_PLACE and space.can_take(place):
-                        found.append(place)
-        return tuple(found)
+        return Furnishing(tuple(placements), tuple(self.mounts), places_for_objects(self.spaces, self.mounts))
 
 
 def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> Furnishing:
@@ -279,38 +283,3 @@ def furnish_home(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: in
     decorate(home.spaces, home.uses, plan, look, seed)
     home.check()
     return home
-
-
-def placed(room: str, piece: Piece, pose: PiecePose, look: Appearance) -> list[Placement]:
-    """Return the placements of a piece of furniture, or of all members if it is a group."""
-    found = []
-    for member, x, y, yaw in flattened(piece, pose.x, pose.y, pose.yaw):
-        turns = round(yaw / (math.pi / 2))
-        turn = yaw - turns * math.pi / 2
-        footprint = None
-        if member.parts and not member.members:
-            spots = np.array([moved(part.spot, x, y, yaw) for part in member.parts])
-            footprint = Rectangle(*spots[:, :2].min(axis=0).tolist(), *spots[:, 2:].max(axis=0).tolist())
-        own = [asset for picture in member.pictures for asset in picture.assets]
-        assets, position = (*look.assets_of(member.geoms), *own), (round(x, 4), round(y, 4), 0.0)
-        turn = 0.0 if abs(turn) < 1e-9 else turn
-        found.append(Placement(member.kind, room, member.geoms, position, turns % 4, footprint, assets, turn))
-    return found
-
-
-def _describe_place(space: Space, piece: Piece, receptacle: str) -> str:
-    if receptacle == "dish_bin":
-        return "on the counter, beside the sink"
-    if piece.kind == "desk":
-        return "on the desk"
-    spot = space.solids[-1]
-    nearest = None
-    for other, pose in space.stood[:-1]:
-        box = moved((-other.size[0] / 2, 0, other.size[0] / 2, other.size[1]), pose.x, pose.y, pose.yaw)
-        dx, dy = max(box[0] - spot[2], spot[0] - box[2], 0), max(box[1] - spot[3], spot[1] - box[3], 0)
-        gap = math.hypot(dx, dy)
-        if gap < 0.8 and (nearest is None or gap < nearest[0]) and other.kind not in BIN_SIZES:
-            nearest = gap, other.kind
-    if nearest is None:
-        return "on the floor, against the wall"
-    return f"on the floor, by the {SHOWN_NAMES.get(nearest[1], nearest[1].replace('_', ' '))}"

@@ -222,7 +222,7 @@ def _outside(plan: HomePlan) -> Iterator[str]:
         ("east", "trim_x", (x1 + 3, y), d),
     ):
         yield (
-            f'<geom name="outside/{name}" group="1" class="{kind}" material="garden" '
+            f'<geom name="outside/{name}" group="1" class="{kind}" material="view_{name}" '
             f'pos="{_n(at[0])} {_n(at[1])} 1.1" size="{_n(length)} 2.6 0.01"/>'
         )
 

@@ -12,21 +12,20 @@ from numpy.typing import NDArray
 
 from mjsim.generator.furniture.drawn_boxes import Boxes, drawn_boxes
 from mjsim.generator.furniture.piece import Piece, Point, Spot, intersect, moved, moved_boxes
+from mjsim.generator.poses import Floats, free_poses, moved_spots, wall_poses
 from mjsim.generator.shell import room_shell
-from mjsim.generator.values import BACK, SIDES, HomePlan, Room, Side
+from mjsim.generator.values import SIDES, HomePlan, Room, Side
 
 # Lengths are in metres.
 BODY = 0.36  # body radius that must fit through all walkways
 # Body radii with clearance. A body must be able to reach all parts of the floor on which it fits.
 PERSON_RADII = (0.25, 0.265, 0.28, 0.29, 0.3)
 POCKET = 0.005  # maximum area of unreachable floor that is tolerated, in square metres
-STEP = 0.1  # distance between poses that are tried along a wall
 BESIDE = 0.6  # width of the floor next to a door that bins should avoid
 BESIDE_MIN = 0.36  # width of the floor next to a door that bins must avoid
 DOORWAY = 1.0  # maximum depth of the free floor in front of a door
 SNUG, APART = 0.09, 0.62  # range of gap widths that are avoided, because people would get stuck
 BEFORE_LEAF = 0.45  # depth of the free floor in front of an open door leaf
-WALL_GAP = 0.01  # gap between a piece of furniture and the wall behind it
 BEFORE_WINDOW = 0.6  # depth of the zone in front of a window where furniture is lower than the sill
 CURTAIN = 0.3  # extra width of that zone on each side of a window with curtains
 # Extra width of that zone on each side of a window with a blind, because leaves of plants may overhang.
@@ -39,8 +38,6 @@ STANDING = 0.25  # radius of the free floor around a person who takes an object 
 WITHIN = 0.65  # maximum distance between such a person's centre and the object
 TRIES = 14  # maximum number of poses per piece for which walkways are checked
 _CELL, _FINE = 0.05, 0.0125  # cell sizes of the grids that detect blocked walkways and unreachable floor
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -127,11 +124,11 @@ class Space:
     ) -> PiecePose | None:
         """Place a piece at its best pose along the given walls. Return the pose, or None if none fits."""
         free = piece.stands == "free"
-        places = self._free_poses() if free else self._wall_poses(piece, sides)
+        places = free_poses(self.room.floor) if free else wall_poses(self.room.floor, piece, sides)
         if not len(places):
             return None
         boxes, hits, uses, bins = (
-            _moved(spots, places)
+            moved_spots(spots, places)
             for spots in (
                 [part.spot for part in piece.parts],
                 [part.hit for part in piece.parts],
@@ -169,7 +166,7 @@ class Space:
             return False
         steps = np.linspace(0.0, 1.0, 9)[:, None]
         hand = np.hstack([place[:2] + steps * (cells[away.argmin()] - place[:2]), np.full((9, 1), place[2])])
-        low, high = hand + (-0.06, -0.06, 0.01), hand + (0.06, 0.06, 0.3)
+        low, high = hand + np.array([-0.06, -0.06, 0.01]), hand + np.array([0.06, 0.06, 0.3])
         return not intersect(np.hstack([low, high]), self.drawn)
 
     def record(self, piece: Piece, place: PiecePose) -> None:
@@ -197,34 +194,6 @@ class Space:
             self.area += (low[2] - low[0]) * (low[3] - low[1])
         self.use.extend(zones)
         self.record(piece, place)
-
-    def _wall_poses(self, piece: Piece, sides: Sequence[Side]) -> Floats:
-        """Return all poses along the walls, in rows of x, y, quarter turns, and position along the wall."""
-        floor, half = self.room.floor, piece.size[0] / 2
-        found = [np.empty((0, 4))]
-        for side in sides:
-            low, high = floor.wall(side)
-            first, last = low + half + WALL_GAP, high - half - WALL_GAP
-            if last < first:
-                continue
-            turns = BACK[side]
-            if piece.stands in ("left", "right"):
-                at_low = (piece.stands == "left") == (turns in (0, 1))
-                along = np.array([first if at_low else last])
-            else:
-                along = np.unique(np.round([*np.arange(first, last, STEP), last], 3))
-            x, y = floor.along(side, first, first, WALL_GAP, WALL_GAP).center
-            rows = np.tile((x, y, turns, 0.0), (len(along), 1))
-            rows[:, 0 if side in ("south", "north") else 1] = rows[:, 3] = along
-            found.append(rows)
-        return np.concatenate(found)
-
-    def _free_poses(self) -> Floats:
-        """Return poses on a grid in two orientations, in the same format as `_wall_poses`."""
-        floor = self.room.floor
-        xs, ys = np.arange(floor.x0, floor.x1, 2 * STEP), np.arange(floor.y0, floor.y1, 2 * STEP)
-        grid = np.stack(np.meshgrid(xs, ys, (0.0, 1.0), (0.0,), indexing="ij"), axis=-1)
-        return grid.reshape(-1, 4)
 
     def _fits(self, boxes: Floats, tops: Floats, uses: Floats, free: bool) -> NDArray[np.bool_]:
         """Return a mask (n,) of the poses at which neither `boxes` nor `uses` overlap anything."""
@@ -304,11 +273,6 @@ class Space:
 
 def _islands(distance: Floats, radius: float) -> Any:
     return cv2.connectedComponentsWithStats((distance > radius).astype(np.uint8), connectivity=4)
-
-
-def _moved(spots: Sequence[Spot], places: Floats) -> Floats:
-    turned = np.array([[moved(spot, 0.0, 0.0, turns * math.pi / 2) for spot in spots] for turns in range(4)])
-    return np.asarray(turned.reshape(4, -1, 4)[places[:, 2].astype(int)] + places[:, None, [0, 1, 0, 1]])
 
 
 def _grown(spot: Spot, x: float, y: float) -> Spot:

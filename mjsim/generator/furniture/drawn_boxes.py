@@ -30,26 +30,28 @@ def _box(geom: ET.Element) -> Boxes:
         return np.concatenate([np.minimum(start, end) - radius, np.maximum(start, end) + radius])
     if shape in ("sphere", "cylinder"):
         size = np.array([size[0], size[0], size[-1]])
-    turn, at = _rotation(geom), _numbers(geom, "pos")
-    half = np.sqrt(turn**2 @ size**2) if shape in ("sphere", "ellipsoid") else np.abs(turn) @ size
-    return np.concatenate([at - half, at + half])
+    at, turn = _numbers(geom, "pos"), _rotation(geom)
+    if turn is not None:
+        size = np.sqrt(turn**2 @ size**2) if shape == "ellipsoid" else np.abs(turn) @ size
+    return np.concatenate([at - size, at + size])
 
 
 def _numbers(geom: ET.Element, name: str) -> NDArray[np.float64]:
     return np.array(geom.get(name, "0 0 0").split(), float)
 
 
-def _rotation(geom: ET.Element) -> NDArray[np.float64]:
-    """Return the rotation matrix of a geom. Euler angles are intrinsic rotations about x, y and z."""
+def _rotation(geom: ET.Element) -> NDArray[np.float64] | None:
+    """Return the rotation matrix of a geom, or None for the identity."""
     _, has_normal, normal = geom.get("class", "").rpartition("_")
     if axes := geom.get("xyaxes", _AXES[normal] if has_normal else ""):
-        x, y = np.array(axes.split(), float).reshape(2, 3)
-        return np.column_stack([x, y, np.cross(x, y)])
+        (a, b, c), (d, e, f) = np.array(axes.split(), float).reshape(2, 3).tolist()
+        return np.array([[a, d, b * f - c * e], [b, e, c * d - a * f], [c, f, a * e - b * d]])
+    if geom.get("euler") is None:
+        return None
     turn = np.eye(3)
     for axis, angle in enumerate(_numbers(geom, "euler").tolist()):
-        u, v = (axis + 1) % 3, (axis + 2) % 3
-        step = np.eye(3)
+        u, v, step = (axis + 1) % 3, (axis + 2) % 3, np.eye(3)
         step[u, u] = step[v, v] = math.cos(angle)
         step[u, v], step[v, u] = -math.sin(angle), math.sin(angle)
-        turn = turn @ step
+        turn = turn @ step  # Euler angles are intrinsic rotations about x, y and z.
     return turn
