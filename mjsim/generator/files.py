@@ -8,21 +8,18 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from mjsim.generator.palette import surfaces
+from mjsim.generator.placements import drop_points
 from mjsim.generator.recipe import RECIPE, Recipe
 from mjsim.generator.shell import shell
 from mjsim.generator.values import Asset, Furnishing
 from mjsim.generator.views import landscapes
 from mjsim.support.toml import read_toml
-from mjsim.values.episode import FLOOR_SHARE
 
 # Model that provides default classes, materials, categories and objects for all generated houses.
 STYLE = "houses/apartment"
 # Materials that default classes and contact shadows use in every house.
 _ALWAYS = {"white", "ceiling", "shadow_box", "shadow_round", "shadow_edge"}
 _SHADOWS = 15.0  # range of shadows in metres; shorter ranges cause speckles on round objects
-# Number of drop points for objects per square metre of floor, low enough for furnished homes.
-POINTS_PER_M2 = 0.32
-POINTS = (8, 40)  # minimum and maximum number of drop points in a house
 _HEAD = """\
 <mujoco model="{name}">
 <compiler angle="radian" texturedir="textures"/>
@@ -126,10 +123,7 @@ def used_materials(world: str, own: list[str], brought: Iterable[Asset], models:
 
 def _catalogue(recipe: Recipe, furnishing: Furnishing, models: Path) -> str:
     plan = recipe.plan
-    on_floor = max(POINTS[0], math.floor(POINTS_PER_M2 * plan.area))
-    points = min(
-        POINTS[1], on_floor + min(len(furnishing.places), math.floor(on_floor / FLOOR_SHARE) - on_floor)
-    )
+    points = drop_points(plan, furnishing.places)
     source = read_toml(models / STYLE / "catalogue.toml")
     mounts = {mount.receptacle: mount for mount in furnishing.mounts}
     categories = {k: c for k, c in source["categories"].items() if c["receptacle"] in mounts}

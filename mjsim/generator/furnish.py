@@ -24,7 +24,7 @@ from mjsim.generator.furniture.appearance import Appearance, draw_appearance
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.catalogue import KINDS
 from mjsim.generator.furniture.piece import BIN_SIZES, Mount, Piece, flattened, moved
-from mjsim.generator.placements import describe_place, placed, places_for_objects
+from mjsim.generator.placements import describe_place, drop_points, placed, places_for_objects
 from mjsim.generator.poses import WALL_GAP
 from mjsim.generator.space import UNUSED, PiecePose, Space
 from mjsim.generator.values import BinPlacement, Furnishing, HomePlan, Palette, Side
@@ -34,6 +34,7 @@ from mjsim.values.errors import HouseError
 ATTEMPTS = 6
 SIZES = 4  # number of sizes that are tried for each piece of furniture
 BARE = 0.285  # minimum covered share of a home's floor, below which more furniture is added
+LARGE = (4, 24)  # minimum number of places for objects (second value) in homes of at least that many rooms
 LEAST, MOST = 0.26, 0.44  # minimum and maximum share of the floor that furniture covers
 MAX_FAILURES = 4  # number of failed placements after which a room counts as full
 # A wash corner has a screen that would block a door, and a kitchenette has a cooker, so both avoid doors.
@@ -149,10 +150,10 @@ class FurnishedHome:
 
     def _put_table(self) -> None:
         """Put a table with a seat for every sleeper and a guest into the home, or a smaller one if none fits."""
-        for seats, space in itertools.product((max(4, self.needed), self.needed), self.rooms(DINING)):
+        for seats, space in itertools.product((max(4, self.needed), self.needed, 1), self.rooms(DINING)):
             if self.put(space, "dining", number=seats, seats=seats):
                 return
-        self._put_first(("dining", "bar_table"), DINING, "a table")
+        self._put_first(("bar_table",), DINING, "a table")
 
     def _put_bins(self) -> None:
         if "office_box" in self.bins:
@@ -190,8 +191,12 @@ class FurnishedHome:
 
     def _put_lounges(self) -> None:
         for space in self.rooms(("living_room", "studio")):
-            if space.room.floor.area >= 9 and self.put(space, "lounge"):
+            if self.put(space, "lounge"):
                 continue
+            if space.room.use == "living_room" and self.attempt < ATTEMPTS - 1:
+                raise HouseError(
+                    f"no place for seats before a television in {space.room.key} of seed {self.seed}"
+                )
             if not self.put(space, "sofa"):
                 self.put(space, "armchair")
 
@@ -206,13 +211,16 @@ class FurnishedHome:
                 _ = any(self.put(space, kind) for kind in FALLBACKS)
 
     def check(self) -> None:
-        """Raise `HouseError` if a room is empty, or if furniture covers too little or too much floor."""
+        """Raise `HouseError` if a room is empty, or if there is too little or too much furniture."""
         share = sum(space.area for space in self.spaces) / self.plan.area
         if not LEAST <= share <= MOST:
             raise HouseError(f"{share:.0%} of the floor is furnished in seed {self.seed}")
         for space in self.spaces:
             if not any(piece.parts and piece.kind not in BIN_SIZES for piece, _ in space.stood):
                 raise HouseError(f"nothing fits into {space.room.key} of seed {self.seed}")
+        points = drop_points(self.plan, self.furnishing().places)
+        if len(self.plan.rooms) >= LARGE[0] and points < LARGE[1]:
+            raise HouseError(f"only {points} objects fit into seed {self.seed}")
 
     def _put_defaults(self, space: Space, again: int = 0) -> None:
         use = self.uses[space.room.key]

@@ -9,11 +9,21 @@ from mjsim.generator.default_furniture import SHOWN_NAMES
 from mjsim.generator.furniture.appearance import Appearance
 from mjsim.generator.furniture.piece import BIN_SIZES, Piece, Point, flattened, moved, moved_point
 from mjsim.generator.space import PiecePose, Space
-from mjsim.generator.values import BinPlacement, Placement, Rectangle
+from mjsim.generator.values import BinPlacement, HomePlan, Placement, Rectangle
+from mjsim.values.episode import FLOOR_SHARE
 
+# Number of points for objects per square metre of floor, low enough for furnished homes.
+POINTS_PER_M2 = 0.32
+POINTS = (8, 40)  # minimum and maximum number of points for objects in a home
 PLACES_APART = 0.6  # minimum distance between places for objects on furniture, in metres
 FROM_BIN = 1.0  # minimum distance between such a place and a bin, in metres
 HIGHEST_PLACE = 1.1  # maximum height of such a place, in metres
+
+
+def drop_points(plan: HomePlan, places: Sequence[Point]) -> int:
+    """Return the number of points at which objects can lie in a home, on the floor and on furniture."""
+    on_floor = max(POINTS[0], math.floor(POINTS_PER_M2 * plan.area))
+    return min(POINTS[1], on_floor + len(places), math.floor(on_floor / FLOOR_SHARE))
 
 
 def places_for_objects(spaces: Sequence[Space], bins: Sequence[BinPlacement]) -> tuple[Point, ...]:

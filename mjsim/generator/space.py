@@ -166,7 +166,7 @@ class Space:
             return False
         steps = np.linspace(0.0, 1.0, 9)[:, None]
         hand = np.hstack([place[:2] + steps * (cells[away.argmin()] - place[:2]), np.full((9, 1), place[2])])
-        low, high = hand + np.array([-0.06, -0.06, 0.01]), hand + np.array([0.06, 0.06, 0.3])
+        low, high = hand + np.array([-0.06, -0.06, 0.02]), hand + np.array([0.06, 0.06, 0.3])
         return not intersect(np.hstack([low, high]), self.drawn)
 
     def record(self, piece: Piece, place: PiecePose) -> None:

@@ -35,12 +35,14 @@ def _mattress(b: Builder, w: float, y: tuple[float, float], z: float, pillows: i
     side = "quilt_a" if quilt == "quilt_c" else quilt
     b.box(side, w + 0.01, (start, y[1] - 0.005), (z + 0.05, z + 0.205))
     b.box(quilt, w + 0.01, (start, y[1] - 0.005), (z + 0.205, z + 0.215))
-    b.places += [(x, y[0] + 1.15, z + 0.215) for x in (w / 2 - 0.22, 0.22 - w / 2)]
     if b.chance(0.5):
         half = w / 2 - 0.05
         b.rod("linen", (-half, start, z + 0.19), (half, start, z + 0.19), 0.045, shape="capsule")
-    if b.chance(0.5):
-        b.box(b.cloth2, w + 0.02, (y[1] - 0.55, y[1] - 0.15), (z + 0.04, z + 0.225), seen=True)
+    foot = z + 0.225 if b.chance(0.5) else z + 0.215
+    if foot > z + 0.215:
+        b.box(b.cloth2, w + 0.02, (y[1] - 0.55, y[1] - 0.15), (z + 0.04, foot))
+    for x in (w / 2 - 0.22, 0.22 - w / 2):
+        b.places += [(x, y[1] - 0.97, z + 0.215), (x, y[1] - 0.35, foot)]
     each = w / pillows
     for i in range(pillows):
         x = w * ((i + 0.5) / pillows - 0.5)

@@ -102,8 +102,9 @@ def armchair(b: Builder) -> Piece:
     b.box(b.cloth, seat, (0.03, d - 0.03), (0.13, 0.3))
     b.box(b.cloth, seat - 0.004, (0.0, 0.14), (0.13, back))
     b.rod(b.cloth, (0.06 - seat / 2, 0.07, back), (seat / 2 - 0.06, 0.07, back), 0.07, shape="capsule")
-    b.box(b.cloth2, seat - 0.02, (0.14, d - 0.02), (0.3, 0.41))
-    b.soft(b.cloth2, (0, d / 2 + 0.05, 0.41), (seat / 2 - 0.02, d / 2 - 0.12, 0.05))
+    b.box(b.cloth2, seat - 0.02, (0.14, d - 0.02), (0.3, 0.43))
+    b.places.append((0.0, d - 0.22, 0.43))
+    b.soft(b.cloth2, (0, d / 2 + 0.05, 0.41), (seat / 2 - 0.02, d / 2 - 0.12, 0.035))
     b.legs(b.wood, w, (0, d), 0.14, 0.07)
     if b.chance(0.6):
         b.pillow(b.pick(*b.look.cloths, "linen"), (0, 0.22, 0.6), (0.18, 0.075, 0.17), -0.3)
