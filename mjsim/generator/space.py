@@ -77,6 +77,9 @@ class Space:
     hung: list[tuple[Side, float, float, float]] = field(default_factory=list)
     stood: list[tuple[Piece, PiecePose]] = field(default_factory=list)
     beside: list[Spot] = field(default_factory=list)  # floor next to doors, which bins must avoid
+    ways: list[Spot] = field(
+        default_factory=list
+    )  # floor in doorways, where no person may stand to use a bin
     drawn: Boxes = field(default_factory=lambda: np.empty((0, 6)))  # boxes of all drawn geoms in the room
     area: float = 0.0  # floor area covered by furniture, in square metres
 
@@ -91,7 +94,7 @@ class Space:
             deep = min(DOORWAY, max(0.75, across - 0.3))
             zone = floor.along(side, door.center - half - 0.06, door.center + half + 0.06, 0, deep)
             space.keep.append((zone.x0, zone.y0, zone.x1, zone.y1))
-            for zones, wide in ((space.corners, BESIDE), (space.beside, BESIDE_MIN)):
+            for zones, wide in ((space.corners, BESIDE), (space.beside, BESIDE_MIN), (space.ways, 0.0)):
                 zone = floor.along(side, door.center - half - wide, door.center + half + wide, 0, BESIDE)
                 zones.append((zone.x0, zone.y0, zone.x1, zone.y1))
             space.doors.append(floor.along(side, door.center, door.center, 0.42, 0.42).center)
@@ -127,18 +130,20 @@ class Space:
         places = free_poses(self.room.floor) if free else wall_poses(self.room.floor, piece, sides)
         if not len(places):
             return None
-        boxes, hits, uses, bins = (
+        boxes, hits, uses, bins, stands = (
             moved_spots(spots, places)
             for spots in (
                 [part.spot for part in piece.parts],
                 [part.hit for part in piece.parts],
                 piece.use,
                 [mount.spot for mount in piece.mounts],
+                [mount.stand for mount in piece.mounts],
             )
         )
         tops = np.array([part.top for part in piece.parts])
         ok = self._fits(boxes, tops, uses, free) & ~_overlap(boxes, np.array(avoid).reshape(-1, 4))
         ok &= ~_overlap(bins, np.array(self.beside).reshape(-1, 4))
+        ok &= ~_overlap(stands, np.array(self.ways).reshape(-1, 4))
         fits = np.flatnonzero(ok)
         order: list[int] = fits[np.argsort(-self._scores(boxes[fits], free), kind="stable")].tolist()
         poses = ((k, self._pose(places[k], free)) for k in order)

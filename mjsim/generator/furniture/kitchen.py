@@ -107,6 +107,7 @@ class KitchenRun:
         b.post("chrome", x, 0.06, (TOP, TOP + 0.15), 0.014)
         b.rod("chrome", (x, 0.06, TOP + 0.15), (x, 0.2, TOP + 0.175), 0.012)
         b.rod("chrome", (x, 0.2, TOP + 0.175), (x, 0.26, TOP + 0.13), 0.012)
+        b.post(b.pick(*b.look.accents), x + 0.22, 0.06, (TOP, TOP + 0.16), 0.028)
         return ON_TOP
 
     def _cooker(self, x: float) -> float:
@@ -123,6 +124,8 @@ class KitchenRun:
             for i in range(4):
                 b.disc("black", x - 0.18 + 0.12 * i, FRONT + 0.024, 0.775, 0.022, 0.02)
         self._base(x)
+        if b.chance(0.5):
+            b.post(b.pick("steel", "accent_a", "dark"), x - 0.14, 0.18, (TOP + 0.011, TOP + 0.12), 0.09)
         if self.hanging and b.chance(0.5):
             b.box("steel", WIDE - 0.004, (0, 0.45), (1.58, 1.66), x)
             b.box("steel", 0.26, (0, 0.26), (1.66, 2.5), x, seen=True)
@@ -132,7 +135,7 @@ class KitchenRun:
             b.fronts(b.front, WIDE - 0.004, (1.62, HIGH), 0.32, 1, 1, x)
             b.box("steel", WIDE - 0.004, (0, 0.36), (1.57, 1.618), x, seen=True)
             return HIGH
-        return TOP
+        return ON_TOP
 
     def _fridge(self, x: float) -> float:
         b = self.b

@@ -11,7 +11,7 @@ VIEW = (1.2, 3.4)  # range of distances from a television to a sofa at the oppos
 
 
 def television(b: Builder) -> Piece:
-    stand = storage.tv_stand(Builder("tv_stand", b.rng, b.look))
+    stand = storage.tv_stand(Builder("tv_stand", b.rng, b.look, b.smaller))
     w, h = b.pick(1.1, 1.25, 1.4), stand.size[2]
     y, tall = 0.14, 0.57 * w
     b.box("black", 0.5, (0.06, 0.26), (h, h + 0.012), seen=True)
@@ -31,7 +31,7 @@ def lounge(b: Builder) -> Piece:
     If the distance allows it, the seats stand at the opposite wall, which is `fit[0]` away.
     """
     name, draw = ("stove", stove) if b.chance(0.2) else ("television", television)
-    focus = draw(Builder(name, b.rng, b.look))
+    focus = draw(Builder(name, b.rng, b.look, b.smaller))
     corner = b.smaller == 0 and b.chance(0.4)
     draw, name = (seats.corner_sofa, "corner_sofa") if corner else (seats.sofa, "sofa")
     if b.smaller > 2:
@@ -93,7 +93,7 @@ def stove(b: Builder) -> Piece:
     for i in range(5):
         b.rod(b.wood, (w / 2 + 0.12, 0.1, 0.07 + 0.1 * i), (w / 2 + 0.12, 0.38, 0.07 + 0.1 * i), 0.05)
     b.guard(0.14, (0.1, 0.38), (0, 0.5), w / 2 + 0.12)
-    parts = ((-w / 2, 0.1, w / 2, y, 2.6), (w / 2, 0.1, w / 2 + 0.19, 0.38, 0.5))
+    parts = ((-w / 2, 0.0, w / 2, y, 2.6), (w / 2, 0.0, w / 2 + 0.19, 0.38, 0.5))
     return b.piece((w + 0.38, d + 0.3, 2.6), use=((-w / 2, y, w / 2, y + 0.6),), parts=parts)
 
 

@@ -57,6 +57,12 @@ class Mount:
         w, d, _ = BIN_SIZES[self.receptacle]
         return moved((-w / 2, -d / 2, w / 2, d / 2), *self.position[:2], self.yaw)
 
+    @property
+    def stand(self) -> Spot:
+        """The floor where a person stands to use the bin."""
+        front = -BIN_SIZES[self.receptacle][1] / 2
+        return moved((-0.2, front - 0.45, 0.2, front - 0.05), *self.position[:2], self.yaw)
+
 
 @dataclass(frozen=True)
 class DrawnTexture:

@@ -214,7 +214,7 @@ def trunk(b: Builder) -> Piece:
     paint = b.pick(b.wood, "wicker", b.front)
     b.shadow(w, (0, d))
     b.box(paint, w, (0, d - 0.01), (0, h - 0.07))
-    b.box(paint, w, (0, d), (h - 0.065, h), seen=True)
+    b.box(paint, w, (0, d), (h - 0.065, h))
     for x in (-0.32 * w, 0.32 * w):
         b.box(b.metal, 0.05, (d - 0.012, d - 0.002), (0, h - 0.07), x, seen=True)
     if b.chance(0.5):
