@@ -120,11 +120,11 @@ def single_bed(b: Builder) -> Piece:
 def day_bed(b: Builder) -> Piece:
     w, d = 2.04, b.pick(0.85, 0.95)
     b.shadow(w, (0, d))
-    b.box(b.wood, w, (0, d), (0.1, 0.3))
+    b.box(b.wood, w - 0.01, (0.005, d - 0.005), (0.1, 0.3))
     b.legs(b.wood, w, (0, d), 0.1, 0.06, 0.03)
     for side in (-1, 1):
         b.box(b.wood, 0.04, (0, d), (0.1, 0.68), side * (w / 2 - 0.02))
-    b.box(b.wood, w, (0, 0.04), (0.1, 0.75))
+    b.box(b.wood, w - 0.01, (0, 0.04), (0.1, 0.75))
     b.box(b.pick(*b.look.quilts), w - 0.09, (0.045, d - 0.01), (0.3, 0.45))
     b.places += [(x, d - 0.21, 0.45) for x in (-0.5, 0.5)]
     for i in range(3):
@@ -139,13 +139,13 @@ def bunk_bed(b: Builder) -> Piece:
     b.guard(w, (0, d), (0.5, h))
     b.legs(paint, w, (0, d), h, 0.035, 0.035)
     for z in (0.25, 1.3):
-        b.box(paint, w, (0.01, d - 0.01), (z, z + 0.1))
+        b.box(paint, w - 0.01, (0.01, d - 0.01), (z, z + 0.1))
         b.box("linen", w - 0.1, (0.04, d - 0.04), (z + 0.1, z + 0.22))
         b.box(b.pick(*b.look.quilts), 1.4, (0.03, d - 0.03), (z + 0.12, z + 0.24), 0.265, seen=True)
         b.soft("linen", (-0.72, d / 2, z + 0.25), (0.2, 0.32, 0.08))
     for y in (0.02, d - 0.045):
         for z in (1.55, 1.69):
-            b.box(paint, w, (y, y + 0.025), (z, z + 0.05), seen=True)
+            b.box(paint, w - 0.01, (y, y + 0.025), (z, z + 0.05), seen=True)
     for x in (0.55, 0.9):
         b.box(paint, 0.04, (d - 0.02, d + 0.02), (0, h), x, seen=True)
     for i in range(5):

@@ -159,7 +159,7 @@ def display_cabinet(b: Builder) -> Piece:
     b.guard(w, (0, d - 0.02), (0.5, h))
     b.box(paint, w, (0, d - 0.035), (0, 0.5))
     b.fronts(paint, w, (0.05, 0.48), d - 0.035, 2, 1, doors=True)
-    b.box(paint, w, (0, 0.015), (0.5, h), seen=True)
+    b.box(paint, w, (0, 0.015), (0.5, h - 0.03), seen=True)
     b.box(paint, w, (0, d - 0.02), (h - 0.03, h), seen=True)
     for x in (-w / 2 + 0.015, w / 2 - 0.015):
         b.box(paint, 0.03, (0.015, d - 0.02), (0.5, h - 0.03), x, seen=True)

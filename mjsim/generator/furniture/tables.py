@@ -191,7 +191,7 @@ def _desk(b: Builder) -> Piece:
         b.lamp(w / 2 - 0.14, 0.14, h)
     if b.chance(0.6) and w > 1.1:
         b.post(b.pick(*b.look.accents), seat + 0.34, 0.2, (h, h + 0.1), 0.035)
-    mount = Mount("office_box", (x, d / 2 - 0.02, h))
+    mount = Mount("office_box", (side * (w / 2 - 0.22), d / 2 - 0.02, h))
     b.places += [mount.position, (w / 2 - 0.19, d - 0.19, h)] if w > 1.5 else [mount.position]
     return b.piece((w, d, 1.22), mounts=(mount,), seats=0)
 

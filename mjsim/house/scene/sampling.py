@@ -24,6 +24,7 @@ from mjsim.values.errors import SamplingError, brief
 MIN_DISTANCE = 1.0  # minimum distance between two points, or a point and a receptacle, in metres
 START_CLEARANCE = 0.5  # minimum distance from the person's start position to any object, in metres
 DROP = (0.01, 0.02)  # range of heights from which objects are dropped, in metres
+MAX_FALL = 0.1  # maximum distance from a surface down to an object that was dropped onto it, in metres
 PACKINGS, DRAWS = 20, 4000  # Incomplete sets of points are discarded to keep the distribution uniform.
 DROPS = 8
 MAX_POINTS = 1000
@@ -86,18 +87,20 @@ def sample_episode(
     require_usable(compiled_house(catalogue))
     if navigable is None:
         navigable = navigable_floor(catalogue)
-    pool, heights = _house_places(catalogue, navigable, seed, points)
+    pool = house_points(catalogue, navigable, seed=seed, points=points)
     categories = _point_categories(catalogue, points, _rng(seed, _Purpose.CATEGORIES))[:objects]
     models = _point_models(catalogue, categories, _rng(seed, _Purpose.MODELS, objects))
     if disorder is not None:
         receptacles = compiled_house(catalogue).receptacles
         homes = [receptacles[catalogue.categories[key].receptacle].center[:2] for key in categories]
-        chosen = disorder.assign(pool, np.array(homes), seed)
-        pool, heights = pool[chosen], heights[chosen]
+        pool = pool[disorder.assign(pool, np.array(homes), seed)]
+    surfaces = {(x, y): z for x, y, z in compiled_house(catalogue).places.tolist()}
     placed = tuple(
-        PlacedObject(f"object_{i:02d}", category, model, (x, y), (x, y, z), (1, 0, 0, 0))
-        for i, (category, model, (x, y), z) in enumerate(
-            zip(categories, models, pool[:objects].tolist(), heights[:objects].tolist(), strict=True)
+        PlacedObject(
+            f"object_{i:02d}", category, model, (x, y), (x, y, surfaces.get((x, y), 0.0)), (1, 0, 0, 0)
+        )
+        for i, (category, model, (x, y)) in enumerate(
+            zip(categories, models, pool[:objects].tolist(), strict=True)
         )
     )
     episode = Episode(
@@ -117,22 +120,11 @@ def house_points(
     catalogue: Catalogue, navigable: NavigablePoints, *, seed: int, points: int = POINTS
 ) -> NDArray[np.float64]:
     """Return the points for all levels of a seed, in metres, shape (points, 2). May raise a SamplingError."""
-    return _house_places(catalogue, navigable, seed, points)[0]
-
-
-def _house_places(
-    catalogue: Catalogue, navigable: NavigablePoints, seed: int, points: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the points for all levels of a seed (points, 2) and the heights of their surfaces, in metres."""
     house, rng = compiled_house(catalogue), _rng(seed, _Purpose.POINTS)
     points = min(points, catalogue.points or points)
     on_top = _places_on_furniture(house, points, rng)
     floor = sample_points(navigable, _keep_away(house, on_top), count=points - len(on_top), rng=rng)
-    if not len(on_top):
-        return floor, np.zeros(points)
-    order = rng.permutation(points)
-    heights = np.append(np.zeros(len(floor)), on_top[:, 2])
-    return np.concatenate([floor, on_top[:, :2]])[order], heights[order]
+    return rng.permutation(np.concatenate([floor, on_top[:, :2]])) if len(on_top) else floor
 
 
 def _places_on_furniture(house: CompiledHouse, points: int, rng: np.random.Generator) -> NDArray[np.float64]:
@@ -231,18 +223,25 @@ def _drop(episode: Episode, catalogue: Catalogue, rng: np.random.Generator) -> E
     dropped = tuple(_above_surface(o, rng) for o in episode.objects)
     for _ in range(DROPS):
         settled = settle(replace(episode, objects=dropped), catalogue)
-        if not settled.faults:
+        faults = settled.faults | _fallen(episode.objects, settled.objects)
+        if not faults:
             return replace(episode, objects=settled.objects)
         dropped = tuple(
-            _above_surface(o, rng) if o.name in settled.faults else last
+            _above_surface(o, rng) if o.name in faults else last
             for o, last in zip(episode.objects, dropped, strict=True)
         )
-    name, fault = next(iter(settled.faults.items()))
+    name, fault = next(iter(faults.items()))
     model = next(o.model for o in episode.objects if o.name == name)
     raise SamplingError(
         f"{name}, a {model!r}, {fault} in each of {DROPS} drops at seed {episode.seed}; flatten the model, "
         "give it rolling friction (condim 6), or take another seed"
     )
+
+
+def _fallen(placed: Sequence[PlacedObject], settled: Sequence[PlacedObject]) -> dict[str, str]:
+    """Return a fault for each object that is below the surface onto which it was dropped."""
+    pairs = zip(placed, settled, strict=True)
+    return {a.name: "fell off furniture" for a, b in pairs if b.position[2] < a.position[2] - MAX_FALL}
 
 
 def _above_surface(placed: PlacedObject, rng: np.random.Generator) -> PlacedObject:

@@ -1,4 +1,5 @@
 import math
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -8,7 +9,9 @@ from houses_cases import PALETTE, compiled
 from mjsim.generator.furniture.appearance import Appearance, draw_appearance
 from mjsim.generator.furniture.catalogue import KINDS
 from mjsim.generator.furniture.drawn_boxes import drawn_boxes
-from mjsim.generator.furniture.piece import Piece
+from mjsim.generator.furniture.piece import BIN_SIZES, Piece, intersect
+from mjsim.house.validation.checked_model import Compiled
+from mjsim.house.validation.drawn import coplanar_faces
 
 SLACK = 0.03  # m
 
@@ -119,6 +122,20 @@ def test_the_box_of_a_rotated_geom_is_tight(geom: str, half: tuple[float, ...]) 
 
 def test_guards_and_shadows_are_not_drawn() -> None:
     assert not len(drawn_boxes('<geom class="guard" size="1 1 1"/><geom class="shadow" size="1 1 1"/>'))
+
+
+def test_no_faces_of_a_piece_flicker(pieces: list[tuple[Piece, mujoco.MjModel]]) -> None:
+    for piece, model in pieces:
+        found = coplanar_faces(Compiled.of("piece", Path("piece.xml"), model))
+        assert not [f for f in found if f.place[1] > 0.002], piece.kind  # the back faces a wall
+
+
+def test_bins_on_furniture_overlap_nothing(pieces: list[tuple[Piece, mujoco.MjModel]]) -> None:
+    for piece, _ in pieces:
+        for mount in piece.mounts:
+            (x0, y0, x1, y1), z = mount.spot, mount.position[2]
+            box = np.array([[x0, y0, z, x1, y1, z + BIN_SIZES[mount.receptacle][2]]])
+            assert not intersect(box, piece.drawn[np.abs(piece.drawn - box).max(axis=1) > 1e-3]), piece.kind
 
 
 def test_places_are_on_surfaces_that_collide(pieces: list[tuple[Piece, mujoco.MjModel]]) -> None:
