@@ -84,18 +84,10 @@ DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
 # Furniture for rooms in which nothing else fits.
 FALLBACKS: Options = ("standing_mirror", "umbrella_stand", "snake_plant", "stool")
 MAX_PLANTS = 2  # maximum number of plants per room
+_RARE = ("aquarium", "piano", "stove", "larder", "dresser", "kitchen_trolley", "cactus")
+_SCARCE = ("bush", "tree", "palm", "fern_stand", "snake_plant", "pouf", "television")
 # Maximum number of pieces per home; the default is no limit.
-MAX_IN_HOME = dict.fromkeys(
-    ("aquarium", "piano", "stove", "larder", "dresser", "kitchen_trolley", "cactus"), 1
-) | {
-    "bush": 2,
-    "tree": 2,
-    "palm": 2,
-    "fern_stand": 2,
-    "snake_plant": 2,
-    "pouf": 2,
-    "television": 2,
-}
+MAX_IN_HOME = dict.fromkeys(_RARE, 1) | dict.fromkeys(_SCARCE, 2)
 ROUNDS = 3  # number of passes through the lists of default furniture
 MAX_OF_KIND = {
     "armchair": 2,

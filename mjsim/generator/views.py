@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from mjsim.generator.furniture.artwork import Image, Plane
 from mjsim.generator.values import Asset, Rgb
 from mjsim.house.catalogue.generated_names import stream
 
@@ -18,8 +18,6 @@ _SKIES: tuple[tuple[Rgb, Rgb], ...] = (  # colours at the top and at the horizon
 _GREENS: tuple[Rgb, ...] = ((0.36, 0.5, 0.27), (0.45, 0.56, 0.3), (0.3, 0.45, 0.33), (0.55, 0.55, 0.32))
 _FACADES: tuple[Rgb, ...] = ((0.85, 0.78, 0.68), (0.72, 0.5, 0.42), (0.8, 0.8, 0.78), (0.64, 0.66, 0.7))
 
-Image = NDArray[np.float64]  # RGB image from 0 to 1, shape (HIGH, WIDE, 3)
-Plane = NDArray[np.float64]  # array of pixel values, shape (HIGH, WIDE)
 Style = Callable[[np.random.Generator, Image, Plane, Plane], None]
 
 
@@ -45,30 +43,25 @@ def landscapes(seed: int) -> list[Asset]:
     return found
 
 
-def _ridge(rng: np.random.Generator, x: Plane, height: float, rough: float) -> Plane:
+def _ridge(rng: np.random.Generator, x: Plane, height: float | Plane, rough: float) -> Plane:
     """Return the height of a random ridge for each pixel, as a share of the image from the top."""
-    waves = sum(
-        rough / k * np.sin(2 * np.pi * k * rng.uniform(1.0, 2.0) * x + rng.uniform(0, 6.3))
-        for k in (1, 2, 4, 9)
-    )
-    return np.asarray(height + waves)
+    for k in (1, 2, 4, 9):
+        height = height + rough / k * np.sin(6.3 * k * rng.uniform(1, 2) * x + rng.uniform(0, 6.3))
+    return np.asarray(height)
 
 
 def _ground(rng: np.random.Generator, image: Image, y: Plane, edge: Plane, colour: Rgb, grain: float) -> None:
     """Fill the image below an edge with a colour and random grain."""
     noise = cv2.GaussianBlur(rng.standard_normal(y.shape), (0, 0), 1.5)
-    shaded = (
-        np.array(colour) * (1 + grain * noise[..., None]) * (1.1 - 0.3 * np.clip(y - edge, 0, 1)[..., None])
-    )
-    image[y > edge] = shaded[y > edge]
+    shade = (1 + grain * noise) * (1.1 - 0.3 * np.clip(y - edge, 0, 1))
+    image[y > edge] = (np.array(colour) * shade[..., None])[y > edge]
 
 
 def _trees(rng: np.random.Generator, image: Image, x: Plane, y: Plane, low: float, count: int) -> None:
     for _ in range(count):
         u, v, r = rng.uniform(0, 1), low + rng.uniform(-0.02, 0.06), rng.uniform(0.03, 0.09)
-        crown = np.hypot((x - u) * WIDE / HIGH, (y - v + 1.2 * r) / 1.3) < r * (
-            1 + 0.1 * np.sin(40 * x + 55 * y)
-        )
+        edge = r * (1 + 0.1 * np.sin(40 * x + 55 * y))
+        crown = np.hypot((x - u) * WIDE / HIGH, (y - v + 1.2 * r) / 1.3) < edge
         trunk = (np.abs(x - u) < 0.08 * r) & (np.abs(y - v) < 0.8 * r)
         image[trunk] = (0.36, 0.28, 0.2)
         green = np.array(_GREENS[int(rng.integers(len(_GREENS)))])
