@@ -237,8 +237,8 @@ def drying_rack(b: Builder) -> Piece:
     w, d, h = b.pick(0.9, 1.1), 0.55, 0.95
     b.guard(w, (0, d), (0, h))
     for x in (-w / 2 + 0.01, w / 2 - 0.01):
-        b.rod("chrome", (x, 0.06, 0.0), (x, d - 0.06, h), 0.01)
-        b.rod("chrome", (x, d - 0.06, 0.0), (x, 0.06, h), 0.01)
+        b.rod("chrome", (x, 0.06, 0.006), (x, d - 0.06, h), 0.01)
+        b.rod("chrome", (x, d - 0.06, 0.006), (x, 0.06, h), 0.01)
     for i in range(6):
         y = 0.03 + (d - 0.06) * i / 5
         b.rod("chrome", (-w / 2, y, h - 0.01), (w / 2, y, h - 0.01), 0.006)

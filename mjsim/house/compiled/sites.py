@@ -148,7 +148,7 @@ class ReceptacleGeometry:
 def object_places(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float64]:
     """Return the positions of all sites `place:<n>`, in metres, shape (k, 3)."""
     sites = [site for site in range(model.nsite) if model.site(site).name.startswith(PLACE)]
-    return data.site_xpos[sites].reshape(-1, 3)
+    return np.asarray(data.site_xpos[sites]).reshape(-1, 3)
 
 
 def receptacle_geometries(model: mujoco.MjModel, keys: Iterable[str]) -> dict[str, ReceptacleGeometry]:
