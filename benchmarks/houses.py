@@ -21,6 +21,7 @@ from benchmarks.support.home_figures import WAY, figures, remade
 from benchmarks.support.home_trials import trial_lines, trials
 from benchmarks.support.requirements import outcome
 from experiments.errors import ConfigError
+from mjsim.generator.furniture.catalogue import KINDS
 from mjsim.house.catalogue.generated_names import ROOMS
 from mjsim.support.files import ROOT, digest_of
 
@@ -42,7 +43,13 @@ FAULTS = (
     "windows_behind",
     "lacking",
     "areas_off",
+    "overlaps",
+    "flicker",
+    "no_view",
+    "few_places",
 )
+# Kinds that are groups of other kinds, so that no piece in a home has their names
+GROUPS = {"lounge", "dining", "wash_corner", "corner_kitchen"}
 
 
 def _count(key: str) -> Callable[[Rows], float]:
@@ -102,6 +109,8 @@ COLUMNS: Mapping[str, Callable[[Rows], float]] = {  # columns of the table
     "doorway m": _of("doorway", min),
     "way m": _of("way", min),
     "draws": _of("draws", max),
+    "places": _of("places", statistics.median),
+    "least places": _of("places", min),
     "door graphs": _different("door_graph"),
     "overlap": _overlap("specimens"),
     "by kind alone": _overlap("kinds"),
@@ -137,6 +146,15 @@ REQUIREMENTS: Mapping[str, tuple[Callable[[Rows], float], str, float]] = {
     ),
     "different door graphs, by use of rooms": (_different("door_graph"), ">=", 300),
     "kinds of furniture": (lambda rows: len({kind for row in rows for kind in row["kinds"]}), ">=", 60),
+    "kinds of furniture that are never placed": (
+        lambda rows: len(set(KINDS) - GROUPS - {kind for row in rows for kind in row["kinds"]}),
+        "<=",
+        0,
+    ),
+    "deepest overlap of drawn furniture, mm": (_of("overlap_mm", max), "<=", 4),
+    "homes with faces that flicker": (_homes("flicker"), "<=", 0),
+    "living rooms without seats that face a television or stove": (_count("no_view"), "<=", 0),
+    "homes of four rooms or more with fewer than 24 places for objects": (_homes("few_places"), "<=", 0),
     "mean overlap of furniture in homes of one size": (
         lambda rows: statistics.fmean(COLUMNS["overlap"](mine) for mine in _by_size(rows).values()),
         "<=",

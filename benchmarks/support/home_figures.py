@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
+from benchmarks.support.home_interiors import interior
 from mjsim.formats.gltf.export import HOUSE, export_scene
 from mjsim.formats.gltf.store import SCENE
 from mjsim.generator.files import house_files
@@ -76,7 +77,8 @@ def figures(home: tuple[int, int]) -> dict[str, Any]:
             if home[1] % DRAWN == 0:
                 scene = json.loads(export_scene(catalogue)[SCENE])
                 about["draws"] = scene["sizes"][HOUSE]["draw_calls"]
-            measured = _Home(compiled_house(catalogue), plan).figures()
+            house = compiled_house(catalogue)
+            measured = _Home(house, plan).figures() | interior(house, plan)
     except Exception as error:  # any error makes the home unusable
         return {**about, "failure": f"{type(error).__name__}: {error}"}
     return {

@@ -8,7 +8,8 @@ import numpy as np
 from mjsim.generator.furniture.appearance import Appearance
 from mjsim.generator.furniture.catalogue import KINDS
 from mjsim.generator.furniture.piece import Piece, Spot, flattened, moved
-from mjsim.generator.space import BLINDS, WALL_GAP, PiecePose, Space
+from mjsim.generator.poses import WALL_GAP
+from mjsim.generator.space import BLINDS, PiecePose, Space
 from mjsim.generator.values import BACK, SIDES, HomePlan, Side, Window
 from mjsim.house.catalogue.generated_names import stream
 
@@ -49,7 +50,7 @@ def decorate(
             space = next(s for s in spaces if s.room.key == door.rooms[0])
             mat = KINDS["door_mat"].make(stream(seed, "door_mat"), look)
             x, y = space.room.floor.along(door.side, door.center, door.center, 0.15, 0.15).center
-            space.stood.append((mat, PiecePose(x, y, BACK[door.side], door.side, door.center)))
+            space.record(mat, PiecePose(x, y, BACK[door.side], door.side, door.center))
     for space in spaces:
         key, use = space.room.key, uses[space.room.key]
         for window in plan.windows_of(key):
@@ -89,7 +90,7 @@ def _dress_window(space: Space, window: Window, use: str, look: Appearance, rng:
         radiator = KINDS["radiator"].make(rng, look, fit=fit)
         place = _at_wall(space, side, window.center)
         spots = [moved(part.spot, place.x, place.y, place.yaw) for part in radiator.parts]
-        if space.connected(spots):
+        if space.is_clear(radiator, place) and space.connected(spots):
             space.stand(radiator, place, spots, (), spots)
             below = radiator.size[2]
     reach = half + 0.33
@@ -102,10 +103,12 @@ def _dress_window(space: Space, window: Window, use: str, look: Appearance, rng:
             for a, b in ((-reach, -half), (half, reach))
         )
         curtains = KINDS["curtains"].make(rng, look, smaller=int(beside > 0 or rng.random() < 0.25), fit=fit)
-        space.stood.append((curtains, _at_wall(space, side, window.center)))
-    elif rng.random() < 0.8:
+        if space.is_clear(curtains, _at_wall(space, side, window.center)):
+            space.record(curtains, _at_wall(space, side, window.center))
+            return
+    if rng.random() < 0.8:
         blind = KINDS[("blind", "roller_blind")[int(rng.integers(2))]].make(rng, look, fit=fit)
-        space.stood.append((blind, _at_wall(space, side, window.center)))
+        space.record(blind, _at_wall(space, side, window.center))
 
 
 def _hang_lamps(space: Space, look: Appearance, rng: np.random.Generator) -> None:
@@ -127,7 +130,7 @@ def _hang_lamps(space: Space, look: Appearance, rng: np.random.Generator) -> Non
         else:
             y = floor.y0 + share * floor.depth
         if all(max(abs(x - u), abs(y - v)) > LAMPS_APART for u, v in hanging):
-            space.stood.append((lamp, PiecePose(x, y, 0 if floor.width >= floor.depth else 1, None)))
+            space.record(lamp, PiecePose(x, y, 0 if floor.width >= floor.depth else 1, None))
 
 
 def _lay_rug(space: Space, use: str, look: Appearance, rng: np.random.Generator) -> None:
@@ -150,7 +153,7 @@ def _lay_rug(space: Space, use: str, look: Appearance, rng: np.random.Generator)
         for place in places:
             spot = _spot(rug, place)
             if not any(_overlap(spot, other) for other in taken):
-                space.stood.append((rug, place))
+                space.record(rug, place)
                 return
 
 
@@ -198,8 +201,9 @@ def _hang_on_walls(space: Space, use: str, look: Appearance, rng: np.random.Gene
         middle = _over(space, side, start + piece.size[0] / 2 + 0.1, end - piece.size[0] / 2 - 0.1)
         if kind == "wall_mirror" and _tallest(space, side, middle - 0.4, middle + 0.4, 0.4) > 0.3:
             piece = KINDS["picture"].make(rng, look, smaller=1)
-        space.stood.append((piece, _at_wall(space, side, middle)))
-        hung += 1
+        if space.is_clear(piece, _at_wall(space, side, middle)):
+            space.record(piece, _at_wall(space, side, middle))
+            hung += 1
 
 
 def _stretches(space: Space, side: Side, low: float, high: float) -> list[tuple[float, float]]:

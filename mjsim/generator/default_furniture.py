@@ -25,7 +25,7 @@ DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
         (("toy_shelf", "low_bookcase", "cube_shelf"), 0.9),
         (("desk",), 0.6),
         (("pouf", "stool", "trunk", "aquarium"), 0.7),
-        (PLANTS, 0.4),
+        (PLANTS, 0.3),
     ),
     "living_room": (
         (("armchair",), 0.8),
@@ -35,7 +35,7 @@ DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
         (("sideboard", "piano", "stove", "aquarium", "chest_of_drawers"), 0.8),
         (("armchair", "pouf", "day_bed"), 0.6),
         ((*_SHELVES, "trunk", "console"), 0.7),
-        (PLANTS, 0.6),
+        (PLANTS, 0.3),
     ),
     "studio": (
         (("chest_of_drawers", "low_bookcase", "cube_shelf"), 1.0),
@@ -45,8 +45,8 @@ DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
     ),
     "kitchen": (
         (("bar_table", "larder", "dresser", "kitchen_trolley"), 0.9),
-        (("kitchen_trolley", "larder", "stool"), 0.7),
-        (PLANTS, 0.6),
+        (("bench", "stool"), 0.3),
+        (PLANTS, 0.4),
     ),
     "dining_room": (
         (("sideboard", "dresser", "display_cabinet"), 1.0),
@@ -83,7 +83,11 @@ DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
 }
 # Furniture for rooms in which nothing else fits.
 FALLBACKS: Options = ("standing_mirror", "umbrella_stand", "snake_plant", "stool")
-MAX_PLANTS = 3
+MAX_PLANTS = 2  # maximum number of plants per room
+_RARE = ("aquarium", "piano", "stove", "larder", "dresser", "kitchen_trolley", "cactus")
+_SCARCE = ("bush", "tree", "palm", "fern_stand", "snake_plant", "pouf", "television")
+# Maximum number of pieces per home; the default is no limit.
+MAX_IN_HOME = dict.fromkeys(_RARE, 1) | dict.fromkeys(_SCARCE, 2)
 ROUNDS = 3  # number of passes through the lists of default furniture
 MAX_OF_KIND = {
     "armchair": 2,
@@ -98,12 +102,6 @@ FURNISHED_SHARES = {"hall": (0.15, 0.25), "living_room": (0.31, 0.38), "studio":
 COOKING: Options = ("kitchen", "living_room", "studio", "dining_room")
 DINING: Options = ("dining_room", "kitchen", "living_room", "studio")
 WORKING: Options = ("office", "child", "bedroom", "studio", "living_room", "dining_room", "hall")
-BIN_SIZES = {  # width, depth and height of bins on the floor, in metres
-    "recycling_bin": (0.48, 0.42, 0.5),
-    "laundry_hamper": (0.51, 0.51, 0.55),
-    "toy_box": (0.62, 0.47, 0.4),
-    "bookshelf": (0.9, 0.34, 0.75),
-}
 BIN_ROOMS: dict[str, Options] = {  # suitable room uses for each bin, in order of preference
     "recycling_bin": ("kitchen", "utility", "hall", "studio", "living_room", "dining_room"),
     "laundry_hamper": ("bathroom", "shower_room", "utility", "bedroom", "hall", "studio"),

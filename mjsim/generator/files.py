@@ -8,9 +8,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from mjsim.generator.palette import surfaces
+from mjsim.generator.placements import drop_points
 from mjsim.generator.recipe import RECIPE, Recipe
 from mjsim.generator.shell import shell
 from mjsim.generator.values import Asset, Furnishing
+from mjsim.generator.views import landscapes
 from mjsim.support.toml import read_toml
 
 # Model that provides default classes, materials, categories and objects for all generated houses.
@@ -18,9 +20,6 @@ STYLE = "houses/apartment"
 # Materials that default classes and contact shadows use in every house.
 _ALWAYS = {"white", "ceiling", "shadow_box", "shadow_round", "shadow_edge"}
 _SHADOWS = 15.0  # range of shadows in metres; shorter ranges cause speckles on round objects
-# Number of drop points for objects per square metre of floor, low enough for furnished homes.
-POINTS_PER_M2 = 0.32
-POINTS = (8, 40)  # minimum and maximum number of drop points in a house
 _HEAD = """\
 <mujoco model="{name}">
 <compiler angle="radian" texturedir="textures"/>
@@ -56,6 +55,7 @@ def house_files(recipe: Recipe, furnishing: Furnishing, models: Path) -> Mapping
     plan = recipe.plan
     world = "\n".join([*shell(plan), *_furniture(furnishing)])
     own = {asset.name: asset for placed in furnishing.placements for asset in placed.assets}
+    own |= {asset.name: asset for asset in landscapes(recipe.seed)}
     x0, x1 = min(r.floor.x0 for r in plan.rooms), max(r.floor.x1 for r in plan.rooms)
     y0, y1 = min(r.floor.y0 for r in plan.rooms), max(r.floor.y1 for r in plan.rooms)
     style = ET.parse(models / STYLE / "defaults.xml").getroot()
@@ -88,6 +88,8 @@ def _furniture(furnishing: Furnishing) -> Iterable[str]:
             f'<body name="{placed.room}/{placed.name}_{number}" pos="{x:.4f} {y:.4f} {z:.4f}" euler="0 0 {yaw:.6f}">'
             f"{placed.geoms}</body>"
         )
+    for number, place in enumerate(furnishing.places):
+        yield f'<site name="place:{number}" class="mount" pos="{" ".join(f"{v:.4f}" for v in place)}"/>'
     for mount in furnishing.mounts:
         x, y, z = mount.position
         yaw = (mount.quarter_turns + 2) % 4 * math.pi / 2
@@ -121,7 +123,7 @@ def used_materials(world: str, own: list[str], brought: Iterable[Asset], models:
 
 def _catalogue(recipe: Recipe, furnishing: Furnishing, models: Path) -> str:
     plan = recipe.plan
-    points = max(POINTS[0], min(POINTS[1], math.floor(POINTS_PER_M2 * plan.area)))
+    points = drop_points(plan, furnishing.places)
     source = read_toml(models / STYLE / "catalogue.toml")
     mounts = {mount.receptacle: mount for mount in furnishing.mounts}
     categories = {k: c for k, c in source["categories"].items() if c["receptacle"] in mounts}

@@ -4,41 +4,43 @@ import itertools
 import math
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-
 from mjsim.generator.decorate import decorate
 from mjsim.generator.default_furniture import (
     BIN_ROOMS,
-    BIN_SIZES,
     COOKING,
     DEFAULTS,
     DINING,
     FALLBACKS,
     FURNISHED_SHARES,
+    MAX_IN_HOME,
     MAX_OF_KIND,
     MAX_PLANTS,
     PLANTS,
     REQUIRED,
     ROUNDS,
-    SHOWN_NAMES,
     WORKING,
 )  # fmt: skip
 from mjsim.generator.furniture.appearance import Appearance, draw_appearance
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.catalogue import KINDS
-from mjsim.generator.furniture.piece import Mount, Piece, flattened, moved
+from mjsim.generator.furniture.piece import BIN_SIZES, Mount, Piece, flattened, moved
+from mjsim.generator.placements import describe_place, drop_points, placed, places_for_objects
+from mjsim.generator.poses import WALL_GAP
 from mjsim.generator.space import UNUSED, PiecePose, Space
-from mjsim.generator.values import BinPlacement, Furnishing, HomePlan, Palette, Placement, Rectangle, Side
+from mjsim.generator.values import BinPlacement, Furnishing, HomePlan, Palette, Side
 from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
 ATTEMPTS = 6
 SIZES = 4  # number of sizes that are tried for each piece of furniture
 BARE = 0.285  # minimum covered share of a home's floor, below which more furniture is added
+LARGE = (4, 24)  # minimum number of places for objects (second value) in homes of at least that many rooms
 LEAST, MOST = 0.26, 0.44  # minimum and maximum share of the floor that furniture covers
 MAX_FAILURES = 4  # number of failed placements after which a room counts as full
 # A wash corner has a screen that would block a door, and a kitchenette has a cooker, so both avoid doors.
 AWAY_FROM_DOORS = ("wash_corner", "kitchenette")
+# Distances of a television from the middle of the seats that face it, in metres.
+ASIDE = (0.0, 0.4, -0.4, 0.8, -0.8)
 AXES: tuple[tuple[Side, ...], ...] = (("south", "north"), ("east", "west"))
 
 
@@ -55,6 +57,7 @@ class FurnishedHome:
         self.uses = {space.room.key: self._use(space) for space in self.spaces}
         self.mounts: list[BinPlacement] = []
         self.seats = 0
+        self.needed = sum(space.room.use in ("bedroom", "studio") for space in self.spaces) + 1
 
     def _use(self, space: Space) -> str:
         room = space.room
@@ -67,16 +70,34 @@ class FurnishedHome:
         return [space for use in uses for space in self.spaces if self.uses[space.room.key] == use]
 
     def put(
-        self, space: Space, kind: str, *, largest: int = 0, smallest: int = SIZES - 1, number: int = 0
+        self,
+        space: Space,
+        kind: str,
+        *,
+        largest: int = 0,
+        smallest: int = SIZES - 1,
+        number: int = 0,
+        seats: int = 0,
     ) -> bool:
-        """Place the largest version of a furniture type that fits into a room. Return False if none fits."""
+        """Place the largest version of a furniture type that fits into a room. Return False if none fits.
+
+        Versions with fewer than `seats` seats are not placed.
+        """
         rng = stream(self.seed, "furniture", space.room.key, kind, str(number), str(self.attempt))
+        fits = (
+            [(sides, None) for sides in ((*AXES[0], *AXES[1]),)]
+            if kind != "lounge"
+            else [
+                (sides, (space.depth(sides[0]) - 2 * WALL_GAP, aside, 0.0))
+                for aside in ASIDE
+                for sides in AXES
+            ]
+        )
         for smaller in range(min(max(largest, self.attempt - 2), smallest), smallest + 1):
-            for sides in AXES if kind == "lounge" else ((*AXES[0], *AXES[1]),):
-                fit = (space.depth(sides[0]), 0.0, 0.0) if kind == "lounge" else None
+            for sides, fit in fits:
                 piece = KINDS[kind].make(rng, self.look, smaller=smaller, fit=fit)
                 avoid = space.corners if kind in AWAY_FROM_DOORS and self.attempt < 3 else ()
-                if (pose := space.put(piece, sides, avoid)) is not None:
+                if piece.seats >= seats and (pose := space.put(piece, sides, avoid)) is not None:
                     self._record(space, piece, pose)
                     return True
         return False
@@ -88,12 +109,12 @@ class FurnishedHome:
             if key in self.bins and all(placed.receptacle != key for placed in self.mounts):
                 x, y, *_ = moved((*mount.position[:2], *mount.position[:2]), pose.x, pose.y, pose.yaw)
                 turns = (pose.turns + round((mount.yaw - math.pi) / (math.pi / 2))) % 4
-                place, position = _describe_place(space, piece, key), (x, y, mount.position[2])
+                place, position = describe_place(space, piece, key), (x, y, mount.position[2])
                 self.mounts.append(BinPlacement(key, space.room.key, place, position, turns))
 
     def put_bin(self, receptacle: str) -> bool:
         """Place a bin on the floor of the first room with enough space. Return False if no room has space."""
-        if receptacle not in BIN_SIZES:
+        if receptacle in ("dish_bin", "office_box"):
             return any(mount.receptacle == receptacle for mount in self.mounts)
         w, d, h = BIN_SIZES[receptacle]
         rng = stream(self.seed, "bin", receptacle, str(self.attempt))
@@ -122,11 +143,17 @@ class FurnishedHome:
                 self._put_any(space, required[i])
             if self.attempt < 3 and self.uses[space.room.key] in ("bedroom", "child", "studio"):
                 self.put(space, "wardrobe" if space.rng.random() < 0.6 else "mirror_wardrobe")
-        self._put_first(("dining", "bar_table"), DINING, "a table")
-        steps = [self._put_lounges, self._put_bins]
+        steps = [self._put_lounges, self._put_table, self._put_bins]
         for step in steps[::-1] if self.attempt % 2 else steps:
             step()
-        self._put_seats(sum(space.room.use in ("bedroom", "studio") for space in self.spaces) + 1)
+        self._put_seats(self.needed)
+
+    def _put_table(self) -> None:
+        """Put a table with a seat for every sleeper and a guest into the home, or a smaller one if none fits."""
+        for seats, space in itertools.product((max(4, self.needed), self.needed, 1), self.rooms(DINING)):
+            if self.put(space, "dining", number=seats, seats=seats):
+                return
+        self._put_first(("bar_table",), DINING, "a table")
 
     def _put_bins(self) -> None:
         if "office_box" in self.bins:
@@ -164,8 +191,12 @@ class FurnishedHome:
 
     def _put_lounges(self) -> None:
         for space in self.rooms(("living_room", "studio")):
-            if space.room.floor.area >= 9 and self.put(space, "lounge", smallest=2):
+            if self.put(space, "lounge"):
                 continue
+            if space.room.use == "living_room":
+                raise HouseError(
+                    f"no place for seats before a television in {space.room.key} of seed {self.seed}"
+                )
             if not self.put(space, "sofa"):
                 self.put(space, "armchair")
 
@@ -180,13 +211,16 @@ class FurnishedHome:
                 _ = any(self.put(space, kind) for kind in FALLBACKS)
 
     def check(self) -> None:
-        """Raise `HouseError` if a room is empty, or if furniture covers too little or too much floor."""
+        """Raise `HouseError` if a room is empty, or if there is too little or too much furniture."""
         share = sum(space.area for space in self.spaces) / self.plan.area
         if not LEAST <= share <= MOST:
             raise HouseError(f"{share:.0%} of the floor is furnished in seed {self.seed}")
         for space in self.spaces:
             if not any(piece.parts and piece.kind not in BIN_SIZES for piece, _ in space.stood):
                 raise HouseError(f"nothing fits into {space.room.key} of seed {self.seed}")
+        points = drop_points(self.plan, self.furnishing().places)
+        if len(self.plan.rooms) >= LARGE[0] and points < LARGE[1]:
+            raise HouseError(f"only {points} objects fit into seed {self.seed}")
 
     def _put_defaults(self, space: Space, again: int = 0) -> None:
         use = self.uses[space.room.key]
@@ -204,12 +238,16 @@ class FurnishedHome:
                 failures += not self._put_one_more(space, order, number, again)
 
     def _put_one_more(self, space: Space, kinds: Sequence[str], number: int, more: int) -> bool:
-        there = [member.kind for piece, _ in space.stood for member, *_ in flattened(piece)]
+        there, home = (
+            [member.kind for other in spaces for piece, _ in other.stood for member, *_ in flattened(piece)]
+            for spaces in ([space], self.spaces)
+        )
         if kinds[0] in PLANTS and sum(kind in PLANTS for kind in there) >= MAX_PLANTS:
             return False
         for kind in kinds:
             most = MAX_OF_KIND.get(kind, 1) + (kind not in UNUSED) * more
-            if there.count(kind) < most and self.put(space, kind, smallest=1, number=number):
+            is_rare = home.count(kind) >= MAX_IN_HOME.get(kind, math.inf)
+            if there.count(kind) < most and not is_rare and self.put(space, kind, smallest=1, number=number):
                 return True
         return False
 
@@ -220,7 +258,7 @@ class FurnishedHome:
             for piece, pose in space.stood
             for placement in placed(space.room.key, piece, pose, self.look)
         ]
-        return Furnishing(tuple(placements), tuple(self.mounts))
+        return Furnishing(tuple(placements), tuple(self.mounts), places_for_objects(self.spaces, self.mounts))
 
 
 def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> Furnishing:
@@ -253,38 +291,3 @@ def furnish_home(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: in
     decorate(home.spaces, home.uses, plan, look, seed)
     home.check()
     return home
-
-
-def placed(room: str, piece: Piece, pose: PiecePose, look: Appearance) -> list[Placement]:
-    """Return the placements of a piece of furniture, or of all members if it is a group."""
-    found = []
-    for member, x, y, yaw in flattened(piece, pose.x, pose.y, pose.yaw):
-        turns = round(yaw / (math.pi / 2))
-        turn = yaw - turns * math.pi / 2
-        footprint = None
-        if member.parts and not member.members:
-            spots = np.array([moved(part.spot, x, y, yaw) for part in member.parts])
-            footprint = Rectangle(*spots[:, :2].min(axis=0).tolist(), *spots[:, 2:].max(axis=0).tolist())
-        own = [asset for picture in member.pictures for asset in picture.assets]
-        assets, position = (*look.assets_of(member.geoms), *own), (round(x, 4), round(y, 4), 0.0)
-        turn = 0.0 if abs(turn) < 1e-9 else turn
-        found.append(Placement(member.kind, room, member.geoms, position, turns % 4, footprint, assets, turn))
-    return found
-
-
-def _describe_place(space: Space, piece: Piece, receptacle: str) -> str:
-    if receptacle == "dish_bin":
-        return "on the counter, beside the sink"
-    if piece.kind == "desk":
-        return "on the desk"
-    spot = space.solids[-1]
-    nearest = None
-    for other, pose in space.stood[:-1]:
-        box = moved((-other.size[0] / 2, 0, other.size[0] / 2, other.size[1]), pose.x, pose.y, pose.yaw)
-        dx, dy = max(box[0] - spot[2], spot[0] - box[2], 0), max(box[1] - spot[3], spot[1] - box[3], 0)
-        gap = math.hypot(dx, dy)
-        if gap < 0.8 and (nearest is None or gap < nearest[0]) and other.kind not in BIN_SIZES:
-            nearest = gap, other.kind
-    if nearest is None:
-        return "on the floor, against the wall"
-    return f"on the floor, by the {SHOWN_NAMES.get(nearest[1], nearest[1].replace('_', ' '))}"

@@ -69,6 +69,7 @@ _MORE = {
 }
 _LIVELY = ("living_room", "studio", "hall")
 HALL_PER_DOOR = (1.2, 1.9)  # range of a hall's floor area per door, in square metres
+COOKING = 7.0  # additional floor area of a living room that contains the kitchen, in square metres
 DOOR, WIDE = 1.3, 2.0  # minimum length of a wall with a door, and of a wall with a passage, in metres
 
 
@@ -110,6 +111,7 @@ def draw_programme(rooms: int, rng: np.random.Generator) -> Programme:
     areas = {}
     for key in keys:
         low, high = NEEDS[key].area
+        low += COOKING if key == "living_room" and "kitchen" not in keys else 0.0
         areas[key] = low + (high - low) * float(np.clip(rng.normal(size, 0.15), 0.03, 0.97))
     hub = next(key for key in ("hall", *_LIVELY) if key in keys)
     ways = _ways(keys, hub, rng)

@@ -42,9 +42,8 @@ def shell(plan: HomePlan) -> Iterator[str]:
     for room in plan.rooms:
         cell = room.floor.grown(HALF)
         (x, y), w, d = cell.center, cell.width / 2, cell.depth / 2
-        inside = "\n".join(_RoomShell(plan, room).elements())
         yield (
-            f'<body name="{room.key}/structure">\n{inside}\n'
+            f'<body name="{room.key}/structure">\n{room_shell(plan, room)}\n'
             f'<geom name="{room.key}/floor" class="floor" material="floor_{room.key}" '
             f'pos="{_n(x)} {_n(y)} -0.05" size="{_n(w)} {_n(d)} 0.05"/>\n'
             f'<geom name="{room.key}/ceiling" class="ceiling" '
@@ -52,6 +51,11 @@ def shell(plan: HomePlan) -> Iterator[str]:
         )
         yield f'<site name="room:{room.key}" class="room" pos="{_n(x)} {_n(y)} 1" size="{_n(w)} {_n(d)} 1"/>'
     yield from _outside(plan)
+
+
+def room_shell(plan: HomePlan, room: Room) -> str:
+    """Return the MJCF geoms of a room's walls, doors and windows."""
+    return "\n".join(_RoomShell(plan, room).elements())
 
 
 class _RoomShell:
@@ -191,9 +195,9 @@ class _RoomShell:
         for up in ((0.2, 0.95), (1.15, 1.85)):
             for along in ((left + 0.1, door.center - 0.05), (door.center + 0.05, right - 0.1)):
                 yield self._slab(side, along, up, (0.012, 0.02), "entrance_panel", "trim")
-        for along in ((left - 0.06, left), (right, right + 0.06)):
+        for along in ((left - 0.06, left + 0.004), (right - 0.004, right + 0.06)):
             yield self._slab(side, along, (0.0, top + 0.06), (-0.018, 0.02), "frame", "trim")
-        yield self._slab(side, (left, right), (top, top + 0.06), (-0.018, 0.02), "frame", "trim")
+        yield self._slab(side, (left, right), (top - 0.004, top + 0.06), (-0.018, 0.02), "frame", "trim")
         x, y = self._room.floor.along(side, right - 0.12, right - 0.06, -0.02, 0.04).center
         yield f'<geom class="decor" type="sphere" material="brass" pos="{_n(x)} {_n(y)} 1.02" size="0.032"/>'
 
@@ -212,13 +216,13 @@ def _outside(plan: HomePlan) -> Iterator[str]:
     y0, y1 = min(r.floor.y0 for r in plan.rooms), max(r.floor.y1 for r in plan.rooms)
     (x, y), w, d = ((x0 + x1) / 2, (y0 + y1) / 2), (x1 - x0) / 2 + 3, (y1 - y0) / 2 + 3
     for name, kind, at, length in (
-        ("north", "trim_y", (x, y1 + 3), w),
-        ("south", "trim_y", (x, y0 - 3), w),
+        ("north", "trim_y", (x, y1 + 3), w - 0.02),
+        ("south", "trim_y", (x, y0 - 3), w - 0.02),
         ("west", "trim_x", (x0 - 3, y), d),
         ("east", "trim_x", (x1 + 3, y), d),
     ):
         yield (
-            f'<geom name="outside/{name}" group="1" class="{kind}" material="garden" '
+            f'<geom name="outside/{name}" group="1" class="{kind}" material="view_{name}" '
             f'pos="{_n(at[0])} {_n(at[1])} 1.1" size="{_n(length)} 2.6 0.01"/>'
         )
 

@@ -1,5 +1,6 @@
 """Find furniture poses in a room that keep doors, windows and walkways clear."""
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -9,20 +10,22 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.generator.furniture.piece import Piece, Spot, moved
-from mjsim.generator.values import BACK, SIDES, HomePlan, Room, Side
+from mjsim.generator.furniture.drawn_boxes import Boxes, drawn_boxes
+from mjsim.generator.furniture.piece import Piece, Point, Spot, intersect, moved, moved_boxes
+from mjsim.generator.poses import Floats, free_poses, moved_spots, wall_poses
+from mjsim.generator.shell import room_shell
+from mjsim.generator.values import SIDES, HomePlan, Room, Side
 
 # Lengths are in metres.
 BODY = 0.36  # body radius that must fit through all walkways
 # Body radii with clearance. A body must be able to reach all parts of the floor on which it fits.
 PERSON_RADII = (0.25, 0.265, 0.28, 0.29, 0.3)
 POCKET = 0.005  # maximum area of unreachable floor that is tolerated, in square metres
-STEP = 0.1  # distance between poses that are tried along a wall
 BESIDE = 0.6  # width of the floor next to a door that bins should avoid
+BESIDE_MIN = 0.36  # width of the floor next to a door that bins must avoid
 DOORWAY = 1.0  # maximum depth of the free floor in front of a door
 SNUG, APART = 0.09, 0.62  # range of gap widths that are avoided, because people would get stuck
 BEFORE_LEAF = 0.45  # depth of the free floor in front of an open door leaf
-WALL_GAP = 0.01  # gap between a piece of furniture and the wall behind it
 BEFORE_WINDOW = 0.6  # depth of the zone in front of a window where furniture is lower than the sill
 CURTAIN = 0.3  # extra width of that zone on each side of a window with curtains
 # Extra width of that zone on each side of a window with a blind, because leaves of plants may overhang.
@@ -31,10 +34,10 @@ BLINDS = ("kitchen", "bathroom", "shower_room", "utility")  # room uses with bli
 AROUND = 0.76  # width of the free floor around a free-standing piece
 NEAR = BODY + 0.15  # maximum distance between a person's centre and a piece that the person uses
 UNUSED = ("radiator", "floor_lamp", "bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
+STANDING = 0.25  # radius of the free floor around a person who takes an object from furniture
+WITHIN = 0.65  # maximum distance between such a person's centre and the object
 TRIES = 14  # maximum number of poses per piece for which walkways are checked
 _CELL, _FINE = 0.05, 0.0125  # cell sizes of the grids that detect blocked walkways and unreachable floor
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -73,20 +76,27 @@ class Space:
     # Occupied parts of the walls as (side, start, end, bottom).
     hung: list[tuple[Side, float, float, float]] = field(default_factory=list)
     stood: list[tuple[Piece, PiecePose]] = field(default_factory=list)
+    beside: list[Spot] = field(default_factory=list)  # floor next to doors, which bins must avoid
+    ways: list[Spot] = field(
+        default_factory=list
+    )  # floor in doorways, where no person may stand to use a bin
+    drawn: Boxes = field(default_factory=lambda: np.empty((0, 6)))  # boxes of all drawn geoms in the room
     area: float = 0.0  # floor area covered by furniture, in square metres
 
     @classmethod
     def of(cls, plan: HomePlan, room: Room, rng: np.random.Generator) -> "Space":
         """Create the space for a room that contains no furniture yet."""
         space, floor = cls(room, rng), room.floor
+        space.drawn = drawn_boxes(room_shell(plan, room))
         for door in plan.doors_of(room.key):
             side, half = door.side_in(room.key), door.width / 2
             across = floor.depth if side in ("south", "north") else floor.width
             deep = min(DOORWAY, max(0.75, across - 0.3))
             zone = floor.along(side, door.center - half - 0.06, door.center + half + 0.06, 0, deep)
             space.keep.append((zone.x0, zone.y0, zone.x1, zone.y1))
-            zone = floor.along(side, door.center - half - BESIDE, door.center + half + BESIDE, 0, BESIDE)
-            space.corners.append((zone.x0, zone.y0, zone.x1, zone.y1))
+            for zones, wide in ((space.corners, BESIDE), (space.beside, BESIDE_MIN), (space.ways, 0.0)):
+                zone = floor.along(side, door.center - half - wide, door.center + half + wide, 0, BESIDE)
+                zones.append((zone.x0, zone.y0, zone.x1, zone.y1))
             space.doors.append(floor.along(side, door.center, door.center, 0.42, 0.42).center)
             space.hung.append((side, door.center - half - 0.12, door.center + half + 0.12, 0.0))
             if door.leaf is not None and door.leaf.room == room.key:
@@ -117,28 +127,62 @@ class Space:
     ) -> PiecePose | None:
         """Place a piece at its best pose along the given walls. Return the pose, or None if none fits."""
         free = piece.stands == "free"
-        places = self._free_poses() if free else self._wall_poses(piece, sides)
+        places = free_poses(self.room.floor) if free else wall_poses(self.room.floor, piece, sides)
         if not len(places):
             return None
-        boxes, hits, uses = (
-            _moved(spots, places)
-            for spots in ([part.spot for part in piece.parts], [part.hit for part in piece.parts], piece.use)
+        boxes, hits, uses, bins, stands = (
+            moved_spots(spots, places)
+            for spots in (
+                [part.spot for part in piece.parts],
+                [part.hit for part in piece.parts],
+                piece.use,
+                [mount.spot for mount in piece.mounts],
+                [mount.stand for mount in piece.mounts],
+            )
         )
         tops = np.array([part.top for part in piece.parts])
         ok = self._fits(boxes, tops, uses, free) & ~_overlap(boxes, np.array(avoid).reshape(-1, 4))
+        ok &= ~_overlap(bins, np.array(self.beside).reshape(-1, 4))
+        ok &= ~_overlap(stands, np.array(self.ways).reshape(-1, 4))
         fits = np.flatnonzero(ok)
-        scores = self._scores(boxes[fits], free)
-        best: list[int] = fits[np.argsort(-scores, kind="stable")[:TRIES]].tolist()
-        for k in best:
+        order: list[int] = fits[np.argsort(-self._scores(boxes[fits], free), kind="stable")].tolist()
+        poses = ((k, self._pose(places[k], free)) for k in order)
+        for k, place in itertools.islice(((k, at) for k, at in poses if self.is_clear(piece, at)), TRIES):
             spots, hit, zones = ([_spot(box) for box in of[k].tolist()] for of in (boxes, hits, uses))
-            used = [] if piece.kind in UNUSED else spots
+            used = (
+                [] if piece.kind in UNUSED else [moved(s, place.x, place.y, place.yaw) for s in piece.reached]
+            )
             if self.connected(hit, zones, used):
                 self.near += used
-                x, y, turns, along = places[k].tolist()
-                place = PiecePose(x, y, int(turns), None if free else SIDES[int(turns)], along)
                 self.stand(piece, place, spots, zones, hit)
                 return place
         return None
+
+    def is_clear(self, piece: Piece, place: PiecePose) -> bool:
+        """Return True if what is drawn of a piece does not overlap anything that is drawn in the room."""
+        return not intersect(moved_boxes(piece.drawn, place.x, place.y, place.yaw), self.drawn)
+
+    def can_take(self, place: Point) -> bool:
+        """Return True if a person can take an object from a place on furniture without bending around things."""
+        floor, free = self.room.floor, self._distance(self.hit, _FINE) > STANDING
+        cells = (np.argwhere(free) - 0.5) * _FINE + (floor.x0, floor.y0)
+        away = np.hypot(*(cells - place[:2]).T)
+        if not len(away) or away.min() > WITHIN:
+            return False
+        steps = np.linspace(0.0, 1.0, 9)[:, None]
+        hand = np.hstack([place[:2] + steps * (cells[away.argmin()] - place[:2]), np.full((9, 1), place[2])])
+        low, high = hand + np.array([-0.06, -0.06, 0.02]), hand + np.array([0.06, 0.06, 0.3])
+        return not intersect(np.hstack([low, high]), self.drawn)
+
+    def record(self, piece: Piece, place: PiecePose) -> None:
+        """Record a piece that takes up no floor at its final pose."""
+        self.stood.append((piece, place))
+        self.drawn = np.concatenate([self.drawn, moved_boxes(piece.drawn, place.x, place.y, place.yaw)])
+
+    @staticmethod
+    def _pose(row: Floats, free: bool) -> PiecePose:
+        x, y, turns, along = row.tolist()
+        return PiecePose(x, y, int(turns), None if free else SIDES[int(turns)], along)
 
     def stand(
         self,
@@ -154,35 +198,7 @@ class Space:
             self.hit.append(low)
             self.area += (low[2] - low[0]) * (low[3] - low[1])
         self.use.extend(zones)
-        self.stood.append((piece, place))
-
-    def _wall_poses(self, piece: Piece, sides: Sequence[Side]) -> Floats:
-        """Return all poses along the walls, in rows of x, y, quarter turns, and position along the wall."""
-        floor, half = self.room.floor, piece.size[0] / 2
-        found = [np.empty((0, 4))]
-        for side in sides:
-            low, high = floor.wall(side)
-            first, last = low + half + WALL_GAP, high - half - WALL_GAP
-            if last < first:
-                continue
-            turns = BACK[side]
-            if piece.stands in ("left", "right"):
-                at_low = (piece.stands == "left") == (turns in (0, 1))
-                along = np.array([first if at_low else last])
-            else:
-                along = np.unique(np.round([*np.arange(first, last, STEP), last], 3))
-            x, y = floor.along(side, first, first, WALL_GAP, WALL_GAP).center
-            rows = np.tile((x, y, turns, 0.0), (len(along), 1))
-            rows[:, 0 if side in ("south", "north") else 1] = rows[:, 3] = along
-            found.append(rows)
-        return np.concatenate(found)
-
-    def _free_poses(self) -> Floats:
-        """Return poses on a grid in two orientations, in the same format as `_wall_poses`."""
-        floor = self.room.floor
-        xs, ys = np.arange(floor.x0, floor.x1, 2 * STEP), np.arange(floor.y0, floor.y1, 2 * STEP)
-        grid = np.stack(np.meshgrid(xs, ys, (0.0, 1.0), (0.0,), indexing="ij"), axis=-1)
-        return grid.reshape(-1, 4)
+        self.record(piece, place)
 
     def _fits(self, boxes: Floats, tops: Floats, uses: Floats, free: bool) -> NDArray[np.bool_]:
         """Return a mask (n,) of the poses at which neither `boxes` nor `uses` overlap anything."""
@@ -262,11 +278,6 @@ class Space:
 
 def _islands(distance: Floats, radius: float) -> Any:
     return cv2.connectedComponentsWithStats((distance > radius).astype(np.uint8), connectivity=4)
-
-
-def _moved(spots: Sequence[Spot], places: Floats) -> Floats:
-    turned = np.array([[moved(spot, 0.0, 0.0, turns * math.pi / 2) for spot in spots] for turns in range(4)])
-    return np.asarray(turned.reshape(4, -1, 4)[places[:, 2].astype(int)] + places[:, None, [0, 1, 0, 1]])
 
 
 def _grown(spot: Spot, x: float, y: float) -> Spot:

@@ -222,6 +222,7 @@ class Furnishing:
 
     placements: tuple[Placement, ...]
     mounts: tuple[BinPlacement, ...]
+    places: tuple[tuple[float, float, float], ...] = ()  # positions on furniture where objects can lie
 
 
 def opposite(side: Side) -> Side:

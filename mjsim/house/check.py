@@ -15,6 +15,7 @@ from mjsim.house.scene.episode_rules import check_fit, check_overlaps, check_pos
 from mjsim.house.scene.sampling import points_that_fit, sample_episode
 from mjsim.house.scene.scene import assemble
 from mjsim.house.validation.checked_model import Compiled, compile_model
+from mjsim.house.validation.drawn import coplanar_faces, describe, overlaps
 from mjsim.house.validation.findings import Finding, errors
 from mjsim.house.validation.object_rules import check_compiled_object
 from mjsim.house.validation.receptacle_rules import check_compiled_receptacle
@@ -86,14 +87,15 @@ def check_house_name(name: str, load: Load = Catalogue.load) -> CheckReport:
         "points that fit": f"{fits}{' or more' if fits == (catalogue.points or POINTS) else ''}",
     }
     compiled = Compiled.of("house", catalogue.house_path, house.model)
+    facts["drawn overlaps"] = describe(compiled, overlaps(compiled), 1000, "mm deep")
+    facts["flickering faces"] = describe(compiled, coplanar_faces(compiled), 10_000, "cm2")
     view = floor_view(compiled, house.rooms, house.receptacles)
     return CheckReport("house", name, (*found, *more), facts, (view,))
 
 
 def _check_sampling(house: CompiledHouse) -> tuple[int, list[Finding]]:
-    keep_away = np.array([r.center[:2] for r in house.receptacles.values()])
     meant = house.catalogue.points or POINTS
-    fits = points_that_fit(house.navigable, keep_away, meant)
+    fits = points_that_fit(house, house.navigable, meant)
     found = []
     if fits < meant:
         found.append(

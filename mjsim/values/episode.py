@@ -15,6 +15,7 @@ from mjsim.values.errors import EpisodeError, brief
 FORMAT_VERSION = 1
 CAPACITY = 2  # maximum number of objects that a person can carry (PAPER section 2)
 POINTS = 40  # default number of points in a house where objects can be dropped
+FLOOR_SHARE = 0.4  # minimum share of these points that are on the floor; the others are on furniture
 
 
 @dataclass(frozen=True)
@@ -28,12 +29,12 @@ class StartPose:
 
 @dataclass(frozen=True)
 class PlacedObject:
-    """A misplaced object that rests on the floor."""
+    """A misplaced object that rests on the floor or on furniture."""
 
     name: str  # unique instance name in the episode, such as `object_07`
     category: str  # catalogue key of the category, such as `dishes`
     model: str  # catalogue key of the object model, such as `mug`
-    point: tuple[float, float]  # floor point (x, y) onto which the object was dropped, in metres
+    point: tuple[float, float]  # point (x, y) at which the object was dropped, in metres
     position: tuple[float, float, float]  # position of the origin after settling, in metres
     quaternion: tuple[float, float, float, float]  # wxyz quaternion after settling
 

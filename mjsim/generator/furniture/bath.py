@@ -172,7 +172,8 @@ def washing_machine(b: Builder) -> Piece:
     b.shadow(0.6, (0, 0.6))
     _machine(b, 0, b.pick("dark", "black"))
     if b.chance(0.5):
-        b.box("wicker", 0.4, (0.12, 0.4), (0.85, 1.03), seen=True)
+        b.box("wicker", 0.26, (0.12, 0.4), (0.85, 1.03), -0.15, seen=True)
+        b.places.append((0.11, 0.36, 0.85))
     else:
         b.box("towel_a", 0.28, (0.12, 0.44), (0.85, 0.91), 0.1, seen=True)
         b.box("towel_white", 0.26, (0.13, 0.43), (0.911, 0.97), 0.1, seen=True)
@@ -236,8 +237,8 @@ def drying_rack(b: Builder) -> Piece:
     w, d, h = b.pick(0.9, 1.1), 0.55, 0.95
     b.guard(w, (0, d), (0, h))
     for x in (-w / 2 + 0.01, w / 2 - 0.01):
-        b.rod("chrome", (x, 0.06, 0.0), (x, d - 0.06, h), 0.01)
-        b.rod("chrome", (x, d - 0.06, 0.0), (x, 0.06, h), 0.01)
+        b.rod("chrome", (x, 0.06, 0.006), (x, d - 0.06, h), 0.01)
+        b.rod("chrome", (x, d - 0.06, 0.006), (x, 0.06, h), 0.01)
     for i in range(6):
         y = 0.03 + (d - 0.06) * i / 5
         b.rod("chrome", (-w / 2, y, h - 0.01), (w / 2, y, h - 0.01), 0.006)

@@ -33,13 +33,16 @@ def _mattress(b: Builder, w: float, y: tuple[float, float], z: float, pillows: i
     start = y[0] + b.pick(0.45, 0.55, 0.62)
     # Avoid quilt_c, whose texture would look stretched on the narrow sides of the bed.
     side = "quilt_a" if quilt == "quilt_c" else quilt
-    b.box(side, w + 0.01, (start, y[1] - 0.005), (z + 0.05, z + 0.205), seen=True)
-    b.box(quilt, w + 0.01, (start, y[1] - 0.005), (z + 0.205, z + 0.215), seen=True)
+    b.box(side, w + 0.01, (start, y[1] - 0.005), (z + 0.05, z + 0.205))
+    b.box(quilt, w + 0.01, (start, y[1] - 0.005), (z + 0.205, z + 0.215))
     if b.chance(0.5):
         half = w / 2 - 0.05
         b.rod("linen", (-half, start, z + 0.19), (half, start, z + 0.19), 0.045, shape="capsule")
-    if b.chance(0.5):
-        b.box(b.cloth2, w + 0.02, (y[1] - 0.55, y[1] - 0.15), (z + 0.04, z + 0.225), seen=True)
+    foot = z + 0.225 if b.chance(0.5) else z + 0.215
+    if foot > z + 0.215:
+        b.box(b.cloth2, w + 0.02, (y[1] - 0.55, y[1] - 0.15), (z + 0.04, foot))
+    for x in (w / 2 - 0.22, 0.22 - w / 2):
+        b.places += [(x, y[1] - 0.97, z + 0.215), (x, y[1] - 0.35, foot)]
     each = w / pillows
     for i in range(pillows):
         x = w * ((i + 0.5) / pillows - 0.5)
@@ -89,7 +92,7 @@ def bedside_table(b: Builder) -> Piece:
     if b.chance(0.65):
         b.lamp(0.03, d / 2 - 0.03, h)
     else:
-        b.clutter(w, (0.08, d - 0.08), h, 1)
+        b.top(w, (0, d - 0.035), h)
     return b.piece((w, d, h + 0.4))
 
 
@@ -117,12 +120,13 @@ def single_bed(b: Builder) -> Piece:
 def day_bed(b: Builder) -> Piece:
     w, d = 2.04, b.pick(0.85, 0.95)
     b.shadow(w, (0, d))
-    b.box(b.wood, w, (0, d), (0.1, 0.3))
+    b.box(b.wood, w - 0.01, (0.005, d - 0.005), (0.1, 0.3))
     b.legs(b.wood, w, (0, d), 0.1, 0.06, 0.03)
     for side in (-1, 1):
         b.box(b.wood, 0.04, (0, d), (0.1, 0.68), side * (w / 2 - 0.02))
-    b.box(b.wood, w, (0, 0.04), (0.1, 0.75))
+    b.box(b.wood, w - 0.01, (0, 0.04), (0.1, 0.75))
     b.box(b.pick(*b.look.quilts), w - 0.09, (0.045, d - 0.01), (0.3, 0.45))
+    b.places += [(x, d - 0.21, 0.45) for x in (-0.5, 0.5)]
     for i in range(3):
         b.pillow(b.pick(*b.look.cloths), (0.6 * (i - 1), 0.16, 0.62), (0.26, 0.09, 0.2), -0.25)
     return b.piece((w, d, 0.84), use=0.7, seats=2)
@@ -135,13 +139,13 @@ def bunk_bed(b: Builder) -> Piece:
     b.guard(w, (0, d), (0.5, h))
     b.legs(paint, w, (0, d), h, 0.035, 0.035)
     for z in (0.25, 1.3):
-        b.box(paint, w, (0.01, d - 0.01), (z, z + 0.1))
+        b.box(paint, w - 0.01, (0.01, d - 0.01), (z, z + 0.1))
         b.box("linen", w - 0.1, (0.04, d - 0.04), (z + 0.1, z + 0.22))
-        b.box(b.pick(*b.look.quilts), 1.4, (0.03, d - 0.03), (z + 0.12, z + 0.24), 0.27, seen=True)
+        b.box(b.pick(*b.look.quilts), 1.4, (0.03, d - 0.03), (z + 0.12, z + 0.24), 0.265, seen=True)
         b.soft("linen", (-0.72, d / 2, z + 0.25), (0.2, 0.32, 0.08))
     for y in (0.02, d - 0.045):
         for z in (1.55, 1.69):
-            b.box(paint, w, (y, y + 0.025), (z, z + 0.05), seen=True)
+            b.box(paint, w - 0.01, (y, y + 0.025), (z, z + 0.05), seen=True)
     for x in (0.55, 0.9):
         b.box(paint, 0.04, (d - 0.02, d + 0.02), (0, h), x, seen=True)
     for i in range(5):

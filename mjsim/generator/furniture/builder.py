@@ -7,14 +7,16 @@ from typing import Any, TypeVar
 import numpy as np
 
 from mjsim.generator.furniture.appearance import Appearance
-from mjsim.generator.furniture.piece import DrawnTexture, Obstacle, Piece, Spot
+from mjsim.generator.furniture.piece import DrawnTexture, Obstacle, Piece, Point, Spot
 
 Span = tuple[float, float]
-Point = tuple[float, float, float]
 T = TypeVar("T")
 PANEL = 0.016  # thickness of cabinet doors and drawer fronts, in metres
 GAP = 0.008  # gap between cabinet doors or drawer fronts, in metres
-_THINGS = ("vase", "plant", "books", "bowl", "box", "candles")
+_LOW = ("books", "bowl", "box", "candles")
+_TALL = ("vase", "plant", "frame")
+SLOT = 0.36  # width of the surface that an object takes up, in metres
+DEEP_TOP, SHALLOW_TOP = 0.5, 0.3  # depths in metres; see `Builder.top`
 FACING = 'xyaxes="-1 0 0 0 0 1"'  # MJCF attribute that makes an image face +y
 
 
@@ -46,6 +48,7 @@ class Builder:
         self.kind, self.rng, self.look, self.smaller, self.fit = kind, rng, look, smaller, fit
         self.geoms: list[str] = []
         self.pictures: list[DrawnTexture] = []
+        self.places: list[Point] = []
         self.wood, self.wood2 = self.pick(*look.woods), self.pick(*look.woods)
         self.cloth, self.cloth2 = self.pick(*look.cloths), self.pick(*look.cloths)
         self.front, self.metal = self.pick(*look.fronts), self.pick(*look.metals)
@@ -163,11 +166,38 @@ class Builder:
         self, w: float, y: Span, z: float, most: int = 3, x: float = 0.0, *, low: bool = False
     ) -> None:
         """Add small objects on a surface of height `z`. If `low` is True, they are at most 0.13 m tall."""
-        things = ("books", "bowl", "box", "candles") if low else _THINGS
         places = int(np.clip(w // 0.35, 1, most))
         for i in range(int(self.rng.integers(1, places + 1))):
             u = x + w * ((i + 0.5) / places - 0.5) + 0.05 * float(self.rng.uniform(-1, 1))
-            getattr(self, f"_{self.pick(*things)}")(u, sum(y) / 2, z)
+            self._thing(u, sum(y) / 2, z, low)
+
+    def top(self, w: float, y: Span, z: float, x: float = 0.0, *, low: bool = False) -> None:
+        """Decorate a surface that people can reach, and mark places where further objects can lie.
+
+        The places are in front of the decoration if the surface is deep, and next to it otherwise.
+        """
+        deep, slots = y[1] - y[0] > DEEP_TOP, max(1, int(w // SLOT))
+        first = int(self.rng.integers(2))
+        for i in range(slots):
+            u, is_decorated = x + w * ((i + 0.5) / slots - 0.5), i % 2 == first
+            if y[1] - y[0] >= SHALLOW_TOP and (deep or not is_decorated):
+                self.places.append((u, max(y[1] - 0.19, sum(y) / 2), z))
+            if self.chance(0.6) if deep else is_decorated:
+                self._thing(u, y[0] + 0.15 if deep else sum(y) / 2, z, low)
+
+    def _thing(self, x: float, y: float, z: float, low: bool) -> None:
+        getattr(self, f"_{self.pick(*_LOW, *(() if low else _TALL))}")(x, y, z)
+
+    def _frame(self, x: float, y: float, z: float) -> None:
+        self.box(self.wood, 0.15, (y - 0.01, y + 0.01), (z, z + 0.2), x, seen=True)
+        self.box(
+            self.pick(*self.look.accents, "cream"),
+            0.11,
+            (y + 0.01, y + 0.013),
+            (z + 0.02, z + 0.18),
+            x,
+            seen=True,
+        )
 
     def _vase(self, x: float, y: float, z: float) -> None:
         tall = float(self.rng.uniform(0.07, 0.1))
@@ -255,6 +285,7 @@ class Builder:
             tuple(use),
             mounts=tuple(more.pop("mounts", ())),
             pictures=tuple(self.pictures),
+            places=tuple(self.places),
             **more,
         )
 

@@ -161,7 +161,7 @@ def radiator(b: Builder) -> Piece:
         for i in range(count):
             b.box(paint, 0.05, (0.02, 0.1), (0.11, top + 0.01), w * ((i + 0.5) / count - 0.5), seen=True)
     else:
-        b.box("ceramic_shade", w - 0.03, (0.03, 0.095), (0.16, top - 0.04), seen=True)
+        b.box("ceramic_shade", w - 0.03, (0.035, 0.095), (0.16, top - 0.04), seen=True)
         b.box(paint, w + 0.02, (0.025, 0.1), (top - 0.02, top + 0.005), seen=True)
     b.post("chrome", w / 2 + 0.03, 0.06, (0.01, 0.2), 0.012)
     return b.piece((w + 0.1, 0.105, top + 0.01))
@@ -174,7 +174,7 @@ def ceiling_lamp(b: Builder) -> Piece:
         b.post("bulb", 0, 0, (z - 0.05, z), b.pick(0.18, 0.24))
         b.post(b.metal, 0, 0, (z - 0.02, z), 0.27)
     elif form == "bowl":
-        b.soft(b.pick("shade", "bulb"), (0, 0, z - 0.022), (0.24, 0.24, 0.03))
+        b.soft(b.pick("shade", "bulb"), (0, 0, z - 0.028), (0.24, 0.24, 0.03))
         b.post(b.metal, 0, 0, (z - 0.052, z), 0.02)
     elif form == "square":
         b.box(b.pick("white", b.wood), 0.5, (-0.25, 0.25), (z - 0.04, z), seen=True)
@@ -185,7 +185,7 @@ def ceiling_lamp(b: Builder) -> Piece:
                 b.post("bulb", 0.32 * (i - 1), 0, (z - 0.05, z - 0.02), 0.09)
             else:
                 x, y = 0.2 * math.cos(2.1 * i), 0.2 * math.sin(2.1 * i)
-                b.soft("bulb", (x, y, z - 0.02), (0.11, 0.11, 0.025))
+                b.soft("bulb", (x, y, z - 0.024), (0.11, 0.11, 0.025))
         b.box(b.metal, 0.8 if form == "bar" else 0.12, (-0.06, 0.06), (z - 0.025, z), seen=True)
     b.on_ceiling()
     return b.piece((0.8, 0.62, z), parts=(), stands="ceiling")

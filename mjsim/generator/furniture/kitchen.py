@@ -57,22 +57,24 @@ class KitchenRun:
     def _drawers(self, x: float) -> float:
         self.b.fronts(self.b.front, WIDE, (0.1, 0.85), FRONT, 1, 3, x)
         self._base(x)
-        if self.b.chance(0.5):
-            self.b.clutter(0.3, (0.15, 0.35), TOP, 1, x, low=True)
-            return ON_TOP
-        return TOP
+        return self._top(x)
+
+    def _top(self, x: float) -> float:
+        self.b.top(WIDE, (0.0, DEEP), TOP, x, low=True)
+        return ON_TOP
 
     def _doors(self, x: float) -> float:
         self.b.fronts(self.b.front, WIDE, (0.1, 0.85), FRONT, self.b.pick(1, 2), 1, x, doors=True)
         self._base(x)
-        if not self.b.chance(0.5):
-            return TOP
+        if not self.b.chance(0.6):
+            return self._top(x)
+        self.b.places.append((x, DEEP - 0.19, TOP))
         paint = self.b.pick("steel", "white", "accent_a", "black")  # material of a kettle or toaster
         if self.b.chance(0.5):
-            self.b.post(paint, x, 0.3, (TOP, ON_TOP), 0.075)
-            self.b.box("black", 0.03, (0.38, 0.42), (TOP + 0.04, ON_TOP - 0.02), x, seen=True)
+            self.b.post(paint, x, 0.14, (TOP, ON_TOP), 0.075)
+            self.b.box("black", 0.03, (0.21, 0.25), (TOP + 0.04, ON_TOP - 0.02), x, seen=True)
         else:
-            self.b.box(paint, 0.28, (0.2, 0.36), (TOP, ON_TOP - 0.02), x, seen=True)
+            self.b.box(paint, 0.28, (0.06, 0.22), (TOP, ON_TOP - 0.02), x, seen=True)
         return ON_TOP
 
     def _rack(self, x: float) -> float:
@@ -86,7 +88,8 @@ class KitchenRun:
         b.box(paint, WIDE - 0.01, (FRONT, FRONT + 0.018), (0.11, 0.73), x, seen=True)
         b.box("dark", WIDE - 0.01, (FRONT, FRONT + 0.018), (0.735, 0.85), x, seen=True)
         b.box("chrome", 0.42, (FRONT + 0.018, FRONT + 0.04), (0.69, 0.71), x, seen=True)
-        return self._base(x)
+        self._base(x)
+        return self._top(x)
 
     def _sink(self, x: float) -> float:
         b, y = self.b, 0.3
@@ -104,6 +107,7 @@ class KitchenRun:
         b.post("chrome", x, 0.06, (TOP, TOP + 0.15), 0.014)
         b.rod("chrome", (x, 0.06, TOP + 0.15), (x, 0.2, TOP + 0.175), 0.012)
         b.rod("chrome", (x, 0.2, TOP + 0.175), (x, 0.26, TOP + 0.13), 0.012)
+        b.post(b.pick(*b.look.accents), x + 0.22, 0.06, (TOP, TOP + 0.16), 0.028)
         return ON_TOP
 
     def _cooker(self, x: float) -> float:
@@ -120,6 +124,8 @@ class KitchenRun:
             for i in range(4):
                 b.disc("black", x - 0.18 + 0.12 * i, FRONT + 0.024, 0.775, 0.022, 0.02)
         self._base(x)
+        if b.chance(0.5):
+            b.post(b.pick("steel", "accent_a", "dark"), x - 0.14, 0.18, (TOP + 0.011, TOP + 0.12), 0.09)
         if self.hanging and b.chance(0.5):
             b.box("steel", WIDE - 0.004, (0, 0.45), (1.58, 1.66), x)
             b.box("steel", 0.26, (0, 0.26), (1.66, 2.5), x, seen=True)
@@ -129,7 +135,7 @@ class KitchenRun:
             b.fronts(b.front, WIDE - 0.004, (1.62, HIGH), 0.32, 1, 1, x)
             b.box("steel", WIDE - 0.004, (0, 0.36), (1.57, 1.618), x, seen=True)
             return HIGH
-        return TOP
+        return ON_TOP
 
     def _fridge(self, x: float) -> float:
         b = self.b
@@ -229,7 +235,7 @@ def kitchen_trolley(b: Builder) -> Piece:
     for z in (0.12, 0.45):
         b.box(paint, w - 0.05, (0.03, d - 0.03), (z, z + 0.02), seen=True)
         b.clutter(w - 0.2, (0.1, d - 0.1), z + 0.02, 2)
-    b.clutter(w - 0.1, (0.1, d - 0.1), h, 2)
+    b.top(w, (0, d), h)
     return b.piece((w, d, h + 0.3), use=0.6)
 
 

@@ -5,11 +5,13 @@ import math
 from mjsim.generator.furniture import decoration, seats, storage, tables
 from mjsim.generator.furniture.artwork import painting
 from mjsim.generator.furniture.builder import Builder
-from mjsim.generator.furniture.piece import Piece, group
+from mjsim.generator.furniture.piece import Piece, group, pushed_in
+
+VIEW = (1.2, 3.4)  # range of distances from a television to a sofa at the opposite wall, in metres
 
 
 def television(b: Builder) -> Piece:
-    stand = storage.tv_stand(Builder("tv_stand", b.rng, b.look))
+    stand = storage.tv_stand(Builder("tv_stand", b.rng, b.look, b.smaller))
     w, h = b.pick(1.1, 1.25, 1.4), stand.size[2]
     y, tall = 0.14, 0.57 * w
     b.box("black", 0.5, (0.06, 0.26), (h, h + 0.012), seen=True)
@@ -24,30 +26,37 @@ def television(b: Builder) -> Piece:
 
 
 def lounge(b: Builder) -> Piece:
-    tv = television(Builder("television", b.rng, b.look))
+    """Create seats around a table that face a television or stove, which is `fit[1]` beside their middle.
+
+    If the distance allows it, the seats stand at the opposite wall, which is `fit[0]` away.
+    """
+    name, draw = ("stove", stove) if b.chance(0.2) else ("television", television)
+    focus = draw(Builder(name, b.rng, b.look, b.smaller))
     corner = b.smaller == 0 and b.chance(0.4)
     draw, name = (seats.corner_sofa, "corner_sofa") if corner else (seats.sofa, "sofa")
+    if b.smaller > 2:
+        draw, name = seats.armchair, "armchair"
     sofa = draw(Builder(name, b.rng, b.look, b.smaller))
-    deep, gap = tv.size[1], (b.pick(2.1, 2.4, 2.7), b.pick(2.0, 2.2), 1.7, 1.3)[min(b.smaller, 3)]
+    deep, gap = focus.size[1], (b.pick(2.1, 2.4, 2.7), b.pick(2.0, 2.2), 1.7, 1.4)[min(b.smaller, 3)]
+    depth, aside, _ = b.fit or (0.0, 0.0, 0.0)
+    across = depth - deep - sofa.size[1]
+    gap = across if VIEW[0] < across < VIEW[1] else gap
     back = deep + gap + sofa.size[1]
-    members = [(tv, 0.0, 0.0, 0.0), (sofa, 0.0, back, math.pi)]
+    members = [(focus, aside, 0.0, 0.0), (sofa, 0.0, back, math.pi)]
     front = back - sofa.size[1] if not corner else back - 0.92
-    if b.smaller < 2:
-        table = tables.coffee_table(Builder("coffee_table", b.rng, b.look, b.smaller))
-        y = front - 0.64 - table.size[1] if not corner else front - 0.66 - table.size[1]
-        x = 0.0
-        if corner:
-            long = sofa.parts[1].spot
-            # The sofa is rotated by half a turn, which swaps left and right.
-            side = 1 if long[0] + long[2] < 0 else -1
-            x = -side * 0.46
-        if y - deep > 0.7:
-            members.append((table, x, y, 0.0))
-    if b.smaller < 3 and b.chance(0.85):
+    table = tables.coffee_table(Builder("coffee_table", b.rng, b.look, b.smaller))
+    long = sofa.parts[-1].spot
+    # The sofa is rotated by half a turn, which swaps left and right.
+    x = math.copysign(0.46, long[0] + long[2]) if corner else 0.0
+    y = front - 0.64 - table.size[1]
+    if y - deep > 0.7:
+        members.append((table, x, y, 0.0))
+    if name != "armchair" and b.chance(0.85):
         wide, half = min(b.pick(2.0, 2.4), sofa.size[0]), min(gap / 2 - 0.1, b.pick(0.7, 0.85))
         rug = Builder("rug", b.rng, b.look, fit=(wide, 2 * half, 0.0))
         members.append((decoration.rug(rug), 0.0, (deep + front) / 2 + 0.25 - half, 0.0))
-    return group(b.kind, members, use=((-0.4, deep, 0.4, deep + 0.6),))
+    use = (aside - 0.4, deep, aside + 0.4, deep + 0.6)
+    return group(b.kind, members, use=(use,))
 
 
 def piano(b: Builder) -> Piece:
@@ -63,7 +72,8 @@ def piano(b: Builder) -> Piece:
     b.image("linen", 0.34, (0.84, 1.05), 0.35, thick=0.006)
     b.clutter(0.8 * w, (0.08, 0.26), h, 2)
     base, stool = b.piece((w, d, h + 0.3), use=0.7), seats.stool(Builder("stool", b.rng, b.look))
-    return group(b.kind, [(base, 0, 0, 0), (stool, 0, d + 0.02, 0)], use=())
+    members = [(base, 0.0, 0.0, 0.0)]
+    return group(b.kind, [*members, pushed_in(members, stool, 0.0, d - 0.1, math.pi)], use=())
 
 
 def stove(b: Builder) -> Piece:
@@ -83,7 +93,7 @@ def stove(b: Builder) -> Piece:
     for i in range(5):
         b.rod(b.wood, (w / 2 + 0.12, 0.1, 0.07 + 0.1 * i), (w / 2 + 0.12, 0.38, 0.07 + 0.1 * i), 0.05)
     b.guard(0.14, (0.1, 0.38), (0, 0.5), w / 2 + 0.12)
-    parts = ((-w / 2, 0.1, w / 2, y, 2.6), (w / 2, 0.1, w / 2 + 0.19, 0.38, 0.5))
+    parts = ((-w / 2, 0.0, w / 2, y, 2.6), (w / 2, 0.0, w / 2 + 0.19, 0.38, 0.5))
     return b.piece((w + 0.38, d + 0.3, 2.6), use=((-w / 2, y, w / 2, y + 0.6),), parts=parts)
 
 
@@ -122,7 +132,7 @@ def coat_rack(b: Builder) -> Piece:
                 b.rod(cloth, (x + u, 0.14, 1.46), (x + u, 0.14, 1.0), 0.03, shape="capsule")
     b.box("wicker", 0.3, (0.04, 0.22), (1.775, 1.9), -0.2 * w, seen=True)
     b.box(b.wood, w, (0.02, 0.24), (0.18, 0.2), seen=True)
-    b.legs(b.wood, w, (0.02, 0.24), 0.2, 0.02, 0.012)
+    b.legs(b.wood, w, (0.02, 0.24), 0.19, 0.02, 0.012)
     for i in range(count):
         x = w * ((i + 0.5) / count - 0.5)
         if b.chance(0.7):

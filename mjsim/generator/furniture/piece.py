@@ -7,10 +7,25 @@ room, and the +z axis points up. Lengths are in metres.
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
+import numpy as np
+
+from mjsim.generator.furniture.drawn_boxes import Boxes, drawn_boxes
 from mjsim.generator.values import Asset
 
 Spot = tuple[float, float, float, float]  # rectangle on the floor (x0, y0, x1, y1), in metres
+Point = tuple[float, float, float]
+PUSHED = (0.24, 0.3, 0.36, 0.42, 0.5, 0.58)  # distances of a seat's back from a table's edge, in metres
+SLACK = 0.003  # depth by which drawn geoms may overlap, such as table legs on a rug, in metres
+BIN_SIZES = {  # width, depth and height of bins, in metres
+    "dish_bin": (0.49, 0.48, 0.21),
+    "laundry_hamper": (0.52, 0.53, 0.56),
+    "office_box": (0.43, 0.35, 0.17),
+    "recycling_bin": (0.51, 0.45, 0.5),
+    "toy_box": (0.62, 0.47, 0.4),
+    "bookshelf": (0.9, 0.34, 0.75),
+}
 
 
 @dataclass(frozen=True)
@@ -36,6 +51,17 @@ class Mount:
     receptacle: str  # catalogue key of the bin, such as "dish_bin"
     position: tuple[float, float, float]  # centre of the bin's base, in metres
     yaw: float = math.pi  # yaw of the bin in radians; the bin faces its local -y direction
+
+    @property
+    def spot(self) -> Spot:
+        w, d, _ = BIN_SIZES[self.receptacle]
+        return moved((-w / 2, -d / 2, w / 2, d / 2), *self.position[:2], self.yaw)
+
+    @property
+    def stand(self) -> Spot:
+        """The floor where a person stands to use the bin."""
+        front = -BIN_SIZES[self.receptacle][1] / 2
+        return moved((-0.2, front - 0.45, 0.2, front - 0.05), *self.position[:2], self.yaw)
 
 
 @dataclass(frozen=True)
@@ -68,7 +94,27 @@ class Piece:
     seats: int = 0
     mounts: tuple[Mount, ...] = ()
     pictures: tuple[DrawnTexture, ...] = ()
+    places: tuple[Point, ...] = ()  # free positions on top of the piece where objects can lie, in metres
     members: tuple["Member", ...] = ()  # members of a group; a group has no geoms
+
+    @property
+    def reached(self) -> list[Spot]:
+        """The obstacles that people must be able to approach, which do not stand on another obstacle."""
+        return [
+            part.spot
+            for part in self.parts
+            if not any(other.top < part.top and _overlap(other.spot, part.spot) for other in self.parts)
+        ]
+
+    @cached_property
+    def drawn(self) -> Boxes:
+        """The bounding boxes of all drawn geoms and bins, as rows of x0, y0, z0, x1, y1, z1 in metres."""
+        boxes = [drawn_boxes(self.geoms), *(moved_boxes(p.drawn, x, y, yaw) for p, x, y, yaw in self.members)]
+        for mount in self.mounts if not self.members else ():
+            x0, y0, x1, y1 = mount.spot
+            z = mount.position[2]
+            boxes.append(np.array([[x0, y0, z, x1, y1, z + BIN_SIZES[mount.receptacle][2]]]))
+        return np.concatenate(boxes)
 
 
 # A piece and its pose in a group, with x and y in metres and yaw in radians.
@@ -82,6 +128,44 @@ def moved(spot: Spot, x: float, y: float, yaw: float) -> Spot:
     xs = [round(x + cos * u - sin * v, 4) for u, v in corners]
     ys = [round(y + sin * u + cos * v, 4) for u, v in corners]
     return min(xs), min(ys), max(xs), max(ys)
+
+
+def moved_point(point: Point, x: float, y: float, yaw: float) -> Point:
+    u, v, _, _ = moved((*point[:2], *point[:2]), x, y, yaw)
+    return u, v, point[2]
+
+
+def moved_boxes(boxes: Boxes, x: float, y: float, yaw: float) -> Boxes:
+    """Rotate and translate boxes. Return the bounding boxes of the results, in metres."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    turn = np.array([[cos, -sin], [sin, cos]])
+    middle, half = (boxes[:, :3] + boxes[:, 3:]) / 2, (boxes[:, 3:] - boxes[:, :3]) / 2
+    middle[:, :2] = middle[:, :2] @ turn.T + (x, y)
+    half[:, :2] = half[:, :2] @ np.abs(turn).T
+    return np.hstack([middle - half, middle + half])
+
+
+def intersect(boxes: Boxes, others: Boxes) -> bool:
+    """Return True if any of `boxes` and any of `others` overlap by more than `SLACK`."""
+    low, high = np.maximum(boxes[:, None, :3], others[:, :3]), np.minimum(boxes[:, None, 3:], others[:, 3:])
+    return bool((high - low > SLACK).all(axis=-1).any())
+
+
+def _overlap(a: Spot, b: Spot) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def pushed_in(members: list["Member"], seat: Piece, x: float, y: float, yaw: float) -> "Member":
+    """Push a seat below the table in `members` as far as its geoms allow.
+
+    The centre of the table's edge is at (x, y), and `yaw` is the direction in which a person would sit.
+    """
+    there = np.concatenate([moved_boxes(p.drawn, *pose) for p, *pose in members])
+    for out in PUSHED:
+        pose = x + out * math.sin(yaw), y - out * math.cos(yaw), yaw
+        if not intersect(moved_boxes(seat.drawn, *pose), there):
+            break
+    return (seat, *pose)
 
 
 def group(
@@ -112,8 +196,9 @@ def group(
     mounts = []
     for p, x, y, yaw in members:
         for mount in p.mounts:
-            u, v, _, _ = moved((*mount.position[:2], *mount.position[:2]), x + dx, y + dy, yaw)
-            mounts.append(Mount(mount.receptacle, (u, v, mount.position[2]), mount.yaw + yaw))
+            at = moved_point(mount.position, x + dx, y + dy, yaw)
+            mounts.append(Mount(mount.receptacle, at, mount.yaw + yaw))
+    places = [moved_point(at, x + dx, y + dy, yaw) for p, x, y, yaw in members for at in p.places]
     return Piece(
         kind,
         (right - left, front - back, max(p.size[2] for p, *_ in members)),
@@ -123,6 +208,7 @@ def group(
         stands,
         sum(p.seats for p, *_ in members) if seats is None else seats,
         tuple(mounts),
+        places=tuple(places),
         members=tuple((p, x + dx, y + dy, yaw) for p, x, y, yaw in members),
     )
 

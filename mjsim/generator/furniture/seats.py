@@ -26,7 +26,8 @@ def _cushions(b: Builder, w: float, y: tuple[float, float], count: int, cloth: s
     wide = w / count
     for i in range(count):
         u = x + w * ((i + 0.5) / count - 0.5)
-        b.box(cloth, wide - 0.012, y, (0.28, 0.42), u)
+        b.box(cloth, wide - 0.012, y, (0.28, 0.45), u)
+        b.places.append((u, y[1] - 0.2, 0.45))
         b.soft(cloth, (u, sum(y) / 2, 0.42), (wide / 2 - 0.01, (y[1] - y[0]) / 2 - 0.01, 0.045))
         b.pillow(cloth, (u, y[0] + 0.07, 0.62), (wide / 2 - 0.015, 0.11, 0.2), -0.18)
 
@@ -46,7 +47,7 @@ def sofa(b: Builder) -> Piece:
     seat = w - 2 * wide
     low = 0.04 if b.chance(0.4) else 0.13
     b.box(b.cloth, seat, (0.02, d - 0.02), (low, 0.28))
-    b.box(b.cloth, seat, (0, 0.2), (low, back))
+    b.box(b.cloth, seat - 0.004, (0, 0.2), (low, back))
     if b.chance(0.5):
         b.rod(b.cloth, (-seat / 2 + 0.09, 0.1, back), (seat / 2 - 0.09, 0.1, back), 0.095, shape="capsule")
         back += 0.1
@@ -99,10 +100,11 @@ def armchair(b: Builder) -> Piece:
     wide = _arms(b, w, d, form, b.cloth)
     seat = w - 2 * wide
     b.box(b.cloth, seat, (0.03, d - 0.03), (0.13, 0.3))
-    b.box(b.cloth, seat, (0.0, 0.14), (0.13, back))
+    b.box(b.cloth, seat - 0.004, (0.0, 0.14), (0.13, back))
     b.rod(b.cloth, (0.06 - seat / 2, 0.07, back), (seat / 2 - 0.06, 0.07, back), 0.07, shape="capsule")
-    b.box(b.cloth2, seat - 0.02, (0.14, d - 0.02), (0.3, 0.41))
-    b.soft(b.cloth2, (0, d / 2 + 0.05, 0.41), (seat / 2 - 0.02, d / 2 - 0.12, 0.05))
+    b.box(b.cloth2, seat - 0.02, (0.14, d - 0.02), (0.3, 0.43))
+    b.places.append((0.0, d - 0.22, 0.43))
+    b.soft(b.cloth2, (0, d / 2 + 0.05, 0.41), (seat / 2 - 0.02, d / 2 - 0.12, 0.035))
     b.legs(b.wood, w, (0, d), 0.14, 0.07)
     if b.chance(0.6):
         b.pillow(b.pick(*b.look.cloths, "linen"), (0, 0.22, 0.6), (0.18, 0.075, 0.17), -0.3)
@@ -133,7 +135,7 @@ def dining_chair(b: Builder) -> Piece:
         b.soft(paint, (0, 0.06, 0.66), (0.21, 0.05, 0.2), (0.12, 0, 0))
         for x in (-0.15, 0.15):
             for y in (0.12, 0.42):
-                b.rod(b.pick(b.wood, b.metal), (1.2 * x, y, 0.0), (0.7 * x, 0.27, 0.43), 0.014)
+                b.rod(b.pick(b.wood, b.metal), (1.2 * x, y, 0.006), (0.7 * x, 0.27, 0.43), 0.014)
         return b.piece((w, d, h), seats=1)
     b.box(b.wood, w, (0.04, d), (0.42, 0.455), seen=True)
     b.legs(b.wood, w, (0.02, d), 0.42, 0.03, 0.018)
@@ -143,7 +145,7 @@ def dining_chair(b: Builder) -> Piece:
         b.box(b.cloth, w - 0.08, (0.015, 0.06), (0.56, h - 0.02), seen=True)
         b.soft(b.cloth, (0, d / 2 + 0.02, 0.46), (w / 2 - 0.02, d / 2 - 0.04, 0.035))
         return b.piece((w, d, h), seats=1)
-    b.box(b.wood, w, (0.018, 0.052), (h - 0.1, h), seen=True)
+    b.box(b.wood, w, (0.018, 0.052), (h - 0.1, h + 0.003), seen=True)
     if form == "ladder":
         for z in (0.55, 0.68):
             b.box(b.wood, w - 0.06, (0.024, 0.046), (z, z + 0.05), seen=True)
@@ -198,7 +200,8 @@ def bench(b: Builder) -> Piece:
             b.box(b.wood, w - 0.02, (0.02, d - 0.02), (0.06, 0.08), seen=True)
             for x in (-w / 4, w / 4):
                 b.box("wicker", w / 2 - 0.12, (0.05, d - 0.04), (0.08, 0.28), x, seen=True)
-    b.box(b.cloth, w - 0.03, (0.015, d - 0.015), (h - 0.04, h + 0.02), seen=True)
+    b.box(b.cloth, w - 0.03, (0.015, d - 0.015), (h - 0.04, h + 0.02))
+    b.places += [(x, d / 2, h + 0.02) for x in (0.19 - w / 2, w / 2 - 0.19)]
     return b.piece((w, d, h + 0.02), use=0.62, seats=2)
 
 

@@ -42,7 +42,7 @@ def chest_of_drawers(b: Builder) -> Piece:
         b.legs(b.wood, w, (0, d - 0.03), low, 0.05, 0.02)
     fronts, columns = b.pick(carcass, b.wood2), 1 if w < 0.85 else 2
     b.fronts(fronts, w, (low + 0.03, h - 0.025), d - 0.035, columns, b.pick(3, 4))
-    b.clutter(0.8 * w, (0.1, d - 0.1), h)
+    b.top(w, (0, d - 0.035), h)
     return b.piece((w, d, h + 0.3), use=0.65)
 
 
@@ -71,7 +71,8 @@ def _shelf(b: Builder, w: float, h: float, d: float, columns: int, rows: int, ba
         b.box(frame, w, (0, 0.012), (0, h), seen=True)
     for i in range(columns + 1):
         x = -w / 2 + 0.012 + (w - 0.024) * i / columns
-        b.box(frame, 0.024, (0.012, d), (0, h), x, seen=True)
+        top = h - 0.01 if 0 < i < columns else h
+        b.box(frame, 0.024, (0.012, d), (0, top), x, seen=True)
     step = (h - 0.08) / rows
     for j in range(rows + 1):
         z = 0.06 if j == 0 else h - 0.02 if j == rows else 0.06 + step * j
@@ -81,7 +82,7 @@ def _shelf(b: Builder, w: float, h: float, d: float, columns: int, rows: int, ba
             wide = w / columns - 0.05
             _filled(b, wide, 0.08 + step * j, step - 0.03, d, -w / 2 + w * (i + 0.5) / columns)
     if h < 1.4:
-        b.clutter(0.8 * w, (0.06, d - 0.06), h)
+        b.top(w, (0, d), h)
         h += 0.3
     return b.piece((w, d, h), use=0.6)
 
@@ -125,7 +126,7 @@ def sideboard(b: Builder) -> Piece:
     for i in (-1, 1):
         b.fronts(fronts, third, (low + 0.02, h - 0.02), d - 0.035, 1, 1, i * third, doors=True)
     b.fronts(fronts, third, (low + 0.02, h - 0.02), d - 0.035, 1, 3)
-    b.clutter(0.85 * w, (0.1, d - 0.12), h, 4)
+    b.top(w, (0, d - 0.035), h)
     return b.piece((w, d, h + 0.3), use=0.65)
 
 
@@ -158,7 +159,7 @@ def display_cabinet(b: Builder) -> Piece:
     b.guard(w, (0, d - 0.02), (0.5, h))
     b.box(paint, w, (0, d - 0.035), (0, 0.5))
     b.fronts(paint, w, (0.05, 0.48), d - 0.035, 2, 1, doors=True)
-    b.box(paint, w, (0, 0.015), (0.5, h), seen=True)
+    b.box(paint, w, (0, 0.015), (0.5, h - 0.03), seen=True)
     b.box(paint, w, (0, d - 0.02), (h - 0.03, h), seen=True)
     for x in (-w / 2 + 0.015, w / 2 - 0.015):
         b.box(paint, 0.03, (0.015, d - 0.02), (0.5, h - 0.03), x, seen=True)
@@ -167,7 +168,7 @@ def display_cabinet(b: Builder) -> Piece:
         if i:
             b.box(paint, w - 0.06, (0.015, d - 0.05), (z, z + 0.015), seen=True)
         b.clutter(w - 0.15, (0.08, d - 0.1), z + 0.015, 2)
-    b.box("pane", w - 0.06, (d - 0.03, d - 0.022), (0.52, h - 0.04), seen=True)
+    b.box("pane", w - 0.06, (d - 0.028, d - 0.022), (0.52, h - 0.04), seen=True)
     b.box(paint, 0.03, (d - 0.03, d - 0.015), (0.5, h - 0.03), seen=True)
     return b.piece((w, d, h), use=0.62)
 
@@ -204,7 +205,7 @@ def filing_cabinet(b: Builder) -> Piece:
     b.box(paint, w, (0, d - 0.035), (0, h))
     b.handle = "bar"
     b.fronts(paint, w, (0.03, h - 0.02), d - 0.035, 1, round(h / 0.33))
-    b.clutter(w, (0.1, d - 0.1), h, 1)
+    b.top(w, (0, d - 0.035), h)
     return b.piece((w, d, h + 0.3), use=0.62)
 
 
@@ -213,12 +214,14 @@ def trunk(b: Builder) -> Piece:
     paint = b.pick(b.wood, "wicker", b.front)
     b.shadow(w, (0, d))
     b.box(paint, w, (0, d - 0.01), (0, h - 0.07))
-    b.box(paint, w, (0, d), (h - 0.065, h), seen=True)
+    b.box(paint, w, (0, d), (h - 0.065, h))
     for x in (-0.32 * w, 0.32 * w):
         b.box(b.metal, 0.05, (d - 0.012, d - 0.002), (0, h - 0.07), x, seen=True)
     if b.chance(0.5):
         b.soft(b.cloth, (0, d / 2, h), (w / 2 - 0.03, d / 2 - 0.03, 0.04))
-    return b.piece((w, d, h + 0.05), use=0.6, seats=1)
+    else:
+        b.top(w, (0, d), h)
+    return b.piece((w, d, h + 0.3), use=0.6, seats=1)
 
 
 def toy_shelf(b: Builder) -> Piece:

@@ -4,7 +4,7 @@ import math
 
 from mjsim.generator.furniture import seats
 from mjsim.generator.furniture.builder import Builder
-from mjsim.generator.furniture.piece import Mount, Piece, group
+from mjsim.generator.furniture.piece import Mount, Piece, group, pushed_in
 
 
 def _table(b: Builder, w: float, d: float, h: float) -> None:
@@ -19,7 +19,7 @@ def _table(b: Builder, w: float, d: float, h: float) -> None:
     elif form == "splayed":
         for x in (-w / 2 + 0.06, w / 2 - 0.06):
             for y in (0.06, d - 0.06):
-                b.rod(b.wood2, (x, y, 0), (0.82 * x, d / 2 + 0.7 * (y - d / 2), h - top), 0.022)
+                b.rod(b.wood2, (x, y, 0.008), (0.82 * x, d / 2 + 0.7 * (y - d / 2), h - top), 0.022)
     else:
         wood, radius = (b.wood, 0.035) if form == "blocks" else (b.pick(b.wood2, b.metal), 0.022)
         b.legs(wood, w, (0, d), h - top, 0.06, radius)
@@ -47,6 +47,7 @@ def _laid(b: Builder, w: float, y: float) -> None:
     if b.chance(0.5):
         b.box(b.pick("linen", b.cloth2), 0.6 * w, (y - 0.16, y + 0.16), (0.74, 0.743), seen=True)
     b.clutter(0.5 * w, (y - 0.1, y + 0.1), 0.744, 2)
+    b.places += [(side * (w / 2 - 0.19), y, 0.74) for side in (-1, 1)]
 
 
 def round_table(b: Builder) -> Piece:
@@ -54,6 +55,7 @@ def round_table(b: Builder) -> Piece:
     b.shadow(2 * r, (0, 2 * r), round_one=True)
     _round(b, r, 0.74)
     b.clutter(0.3, (r - 0.1, r + 0.1), 0.74, 1)
+    b.places += [(0.5 * r * u, r + 0.5 * r * v, 0.74) for u in (-1, 1) for v in (-1, 1)]
     return b.piece((2 * r, 2 * r, 1.1), stands="free")
 
 
@@ -86,19 +88,16 @@ def dining(b: Builder) -> Piece:
             Builder("dining_chair", type(b.rng)(type(b.rng.bit_generator)(state)), b.look)
         )
 
-    out, members = 0.24, [(base, 0.0, 0.0, 0.0)]
-    each = 2 if w >= 1.15 and b.smaller < 2 else 1
-    if name == "round_table":
-        members += [(chair(), 0.0, -out, 0.0), (chair(), 0.0, d + out, math.pi)]
-        members += [(chair(), side * (w / 2 + out), d / 2, side * math.pi / 2) for side in (-1, 1)]
-    else:
-        for i in range(each):
-            x = (i + 0.5) * w / each - w / 2
-            members.append((chair(), x, d + out, math.pi))
-            if not against:
-                members.append((chair(), x, -out, 0.0))
-        if (w >= 1.5 and b.chance(0.5)) or b.smaller:
-            members += [(chair(), side * (w / 2 + out), d / 2, side * math.pi / 2) for side in (-1, 1)]
+    edges = []  # middle of each seat's table edge, and the direction in which a person sits there
+    each = 2 if w >= 1.15 and b.smaller < 2 and name == "table" else 1
+    for i in range(each):
+        x = (i + 0.5) * w / each - w / 2
+        edges += [(x, d, math.pi)] if against else [(x, d, math.pi), (x, 0.0, 0.0)]
+    if name == "round_table" or (w >= 1.5 and b.chance(0.5)) or b.smaller:
+        edges += [(side * w / 2, d / 2, side * math.pi / 2) for side in (-1, 1)]
+    members = [(base, 0.0, 0.0, 0.0)]
+    for edge in edges:
+        members.append(pushed_in(members, chair(), *edge))
     if b.chance(0.7):
         members.append((pendant_lamp(Builder("pendant_lamp", b.rng, b.look)), 0.0, d / 2 - 0.3, 0.0))
     return group(b.kind, members, use=(), stands="wall" if against else "free")
@@ -110,7 +109,8 @@ def coffee_table(b: Builder) -> Piece:
         r = b.pick(0.35, 0.42)
         b.shadow(2 * r, (0, 2 * r), round_one=True)
         _round(b, r, h)
-        b.clutter(0.3, (r - 0.1, r + 0.1), h, 1)
+        b.clutter(0.1, (r - 0.1, r + 0.1), h, 1, -0.4 * r)
+        b.places.append((0.4 * r, r, h))
         return b.piece((2 * r, 2 * r, h + 0.3), stands="free")
     w, d = b.size(0.8, 1.2, 0.1), b.pick(0.5, 0.6)
     b.shadow(w, (0, d))
@@ -122,7 +122,7 @@ def coffee_table(b: Builder) -> Piece:
         b.legs(b.pick(b.wood, b.metal), w, (0, d), h - 0.035, 0.05, 0.022)
         if form == "shelf":
             b.box(b.wood, w - 0.1, (0.05, d - 0.05), (0.12, 0.14), seen=True)
-    b.clutter(0.8 * w, (d / 2 - 0.1, d / 2 + 0.1), h, 2)
+    b.top(w, (0, d), h)
     return b.piece((w, d, h + 0.3), stands="free")
 
 
@@ -137,7 +137,7 @@ def side_table(b: Builder) -> Piece:
     if b.chance(0.6):
         b.lamp(0, r, h)
     else:
-        b.clutter(0.2, (r - 0.05, r + 0.05), h, 1)
+        b.top(2 * r, (0, 2 * r), h)
     return b.piece((2 * r, 2 * r, h + 0.4))
 
 
@@ -148,10 +148,10 @@ def console(b: Builder) -> Piece:
     b.fronts(b.wood2, w, (h - 0.12, h - 0.02), d - 0.02 - 0.002, b.pick(2, 3))
     b.legs(b.wood, w, (0, d - 0.02), h - 0.13, 0.04, 0.02)
     if b.chance(0.6):
-        b.box(b.wood, w - 0.06, (0.02, d - 0.04), (0.15, 0.17), seen=True)
+        b.box(b.wood, w - 0.06, (0.025, d - 0.045), (0.15, 0.17), seen=True)
         b.box("wicker", 0.34, (0.04, d - 0.06), (0.17, 0.36), -0.2, seen=True)
     b.lamp(-w / 2 + 0.18, d / 2 - 0.02, h)
-    b.clutter(0.4 * w, (0.08, d - 0.08), h, 1)
+    b.top(w - 0.36, (0, d - 0.02), h, 0.18)
     return b.piece((w, d, h + 0.4), use=0.62)
 
 
@@ -191,7 +191,8 @@ def _desk(b: Builder) -> Piece:
         b.lamp(w / 2 - 0.14, 0.14, h)
     if b.chance(0.6) and w > 1.1:
         b.post(b.pick(*b.look.accents), seat + 0.34, 0.2, (h, h + 0.1), 0.035)
-    mount = Mount("office_box", (x, d / 2 - 0.02, h))
+    mount = Mount("office_box", (side * (w / 2 - 0.22), d / 2 - 0.02, h))
+    b.places += [mount.position, (w / 2 - 0.19, d - 0.19, h)] if w > 1.5 else [mount.position]
     return b.piece((w, d, 1.22), mounts=(mount,), seats=0)
 
 
@@ -201,9 +202,9 @@ def desk(b: Builder) -> Piece:
     w, d, _ = base.size
     x = 0.22 if w > 1.1 else 0.25
     turn = math.pi + float(b.rng.uniform(-0.35, 0.35))
-    away = d - 0.06 + 0.56
     use = ((-w / 2, d, -w / 2 + 0.5, d + 0.72),)
-    return group(b.kind, [(base, 0, 0, 0), (chair, x + 0.28 * math.sin(turn), away, turn)], use=use)
+    members = [(base, 0.0, 0.0, 0.0)]
+    return group(b.kind, [*members, pushed_in(members, chair, x, d, turn)], use=use)
 
 
 def dressing_table(b: Builder) -> Piece:
@@ -233,10 +234,10 @@ def bar_table(b: Builder) -> Piece:
     b.box(b.pick(b.wood, "stone"), w, (0, d), (h - 0.04, h))
     b.legs(b.metal, w, (0, d), h - 0.04, 0.06, 0.025)
     b.box(b.metal, w - 0.12, (0.06, 0.09), (0.2, 0.23), seen=True)
-    b.clutter(0.6 * w, (0.1, d - 0.1), h, 2)
-    base, members = b.piece((w, d, h + 0.25)), []
+    b.top(w, (0, d), h)
+    members = [(b.piece((w, d, h + 0.25)), 0.0, 0.0, 0.0)]
     state = int(b.rng.integers(2**31))
     for side in (-1, 1):
         stool = seats.bar_stool(Builder("bar_stool", type(b.rng)(type(b.rng.bit_generator)(state)), b.look))
-        members.append((stool, side * w / 4, d + 0.28, math.pi))
-    return group(b.kind, [(base, 0, 0, 0), *members], use=())
+        members.append(pushed_in(members, stool, side * w / 4, d, math.pi))
+    return group(b.kind, members, use=())

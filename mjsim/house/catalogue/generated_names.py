@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 PREFIX = "generated:"
-VERSION = 3  # version of the home generator; any change that alters a generated home must increase it
+VERSION = 4  # version of the home generator; any change that alters a generated home must increase it
 ROOMS = (1, 10)  # minimum and maximum number of rooms in a generated home
 MAX_SEED = 2**63 - 1
 MAX_HOUSES = 100_000
@@ -94,8 +94,9 @@ def check_version(version: int, subject: str) -> None:
     """Raise a HouseError about `subject` if `version` is not the version of this home generator."""
     if version != VERSION:
         raise HouseError(
-            f"{subject} has version {version} of the house generator, but this mjsim has version {VERSION}; "
-            f"install the older mjsim, or generate the home again without the version"
+            f"{subject} has version {version} of the house generator, but this mjsim has version {VERSION}, which "
+            "makes other homes from the same seeds; install the older mjsim, or generate the home again without the "
+            "version"
         )
 
 

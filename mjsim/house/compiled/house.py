@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.model_files import read_model
 from mjsim.house.compiled.footprint import Footprint, footprint
-from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap, receptacle_geometries
+from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap, object_places, receptacle_geometries
 from mjsim.values.errors import AssetError, SamplingError
 
 VISUAL_BODY = "looks"  # name of the body that contains an object's visual geoms
@@ -163,6 +163,11 @@ class CompiledHouse:
     @cached_property
     def receptacles(self) -> dict[str, ReceptacleGeometry]:
         return receptacle_geometries(self.model, self.catalogue.receptacles)
+
+    @cached_property
+    def places(self) -> NDArray[np.float64]:
+        """The places on furniture where objects can lie, in metres, shape (k, 3). Most houses have none."""
+        return object_places(self.model, self.data)
 
     @cached_property
     def floor(self) -> Footprint:

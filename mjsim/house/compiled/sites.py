@@ -12,6 +12,7 @@ from mjsim.support.kernels import kernel
 from mjsim.values.errors import AssetError
 
 PREFIX = "room:"
+PLACE = "place:"  # first part of the names of sites on furniture where objects can lie
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +149,12 @@ class ReceptacleGeometry:
         local = self.rotation.T @ np.array([*(xy - self.center[:2]), 0.0])
         inside = np.clip(local, -self.half_size - margin, self.half_size + margin)
         return np.asarray((self.center + self.rotation @ inside)[:2])
+
+
+def object_places(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float64]:
+    """Return the positions of all sites `place:<n>`, in metres, shape (k, 3)."""
+    sites = [site for site in range(model.nsite) if model.site(site).name.startswith(PLACE)]
+    return np.asarray(data.site_xpos[sites]).reshape(-1, 3)
 
 
 def receptacle_geometries(model: mujoco.MjModel, keys: Iterable[str]) -> dict[str, ReceptacleGeometry]:

@@ -13,17 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.compiled.house import NavigablePoints, compiled_house, navigable_floor
+from mjsim.house.compiled.house import CompiledHouse, NavigablePoints, compiled_house, navigable_floor
 from mjsim.house.compiled.rays import first_hit
 from mjsim.house.scene.disorder import Disorder
 from mjsim.house.scene.settling import settle
 from mjsim.house.validation.validate import require_usable
-from mjsim.values.episode import POINTS, Episode, PlacedObject, StartPose
+from mjsim.values.episode import FLOOR_SHARE, POINTS, Episode, PlacedObject, StartPose
 from mjsim.values.errors import SamplingError, brief
 
 MIN_DISTANCE = 1.0  # minimum distance between two points, or a point and a receptacle, in metres
 START_CLEARANCE = 0.5  # minimum distance from the person's start position to any object, in metres
 DROP = (0.01, 0.02)  # range of heights from which objects are dropped, in metres
+MAX_FALL = 0.1  # maximum distance from a surface down to an object that was dropped onto it, in metres
 PACKINGS, DRAWS = 20, 4000  # Incomplete sets of points are discarded to keep the distribution uniform.
 DROPS = 8
 MAX_POINTS = 1000
@@ -69,7 +70,7 @@ def sample_episode(
             from its receptacle is close to an observed distance. By default, the first points are used.
 
     Returns:
-        The episode, with all objects at rest on the floor.
+        The episode, with all objects at rest on the floor or on furniture.
 
     Raises:
         SamplingError: An argument is out of range, or the house has no room for the points, objects or start.
@@ -93,9 +94,14 @@ def sample_episode(
         receptacles = compiled_house(catalogue).receptacles
         homes = [receptacles[catalogue.categories[key].receptacle].center[:2] for key in categories]
         pool = pool[disorder.assign(pool, np.array(homes), seed)]
+    surfaces = {(x, y): z for x, y, z in compiled_house(catalogue).places.tolist()}
     placed = tuple(
-        PlacedObject(f"object_{i:02d}", category, model, (float(x), float(y)), (0, 0, 0), (1, 0, 0, 0))
-        for i, (category, model, (x, y)) in enumerate(zip(categories, models, pool[:objects], strict=True))
+        PlacedObject(
+            f"object_{i:02d}", category, model, (x, y), (x, y, surfaces.get((x, y), 0.0)), (1, 0, 0, 0)
+        )
+        for i, (category, model, (x, y)) in enumerate(
+            zip(categories, models, pool[:objects].tolist(), strict=True)
+        )
     )
     episode = Episode(
         house=catalogue.name,
@@ -114,9 +120,23 @@ def house_points(
     catalogue: Catalogue, navigable: NavigablePoints, *, seed: int, points: int = POINTS
 ) -> NDArray[np.float64]:
     """Return the points for all levels of a seed, in metres, shape (points, 2). May raise a SamplingError."""
+    house, rng = compiled_house(catalogue), _rng(seed, _Purpose.POINTS)
     points = min(points, catalogue.points or points)
-    centers = np.array([r.center[:2] for r in compiled_house(catalogue).receptacles.values()])
-    return sample_points(navigable, centers, count=points, rng=_rng(seed, _Purpose.POINTS))
+    on_top = _places_on_furniture(house, points, rng)
+    floor = sample_points(navigable, _keep_away(house, on_top), count=points - len(on_top), rng=rng)
+    return rng.permutation(np.concatenate([floor, on_top[:, :2]])) if len(on_top) else floor
+
+
+def _places_on_furniture(house: CompiledHouse, points: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Draw the places on furniture (k, 3) among `points` points, in metres. The other points are on the floor."""
+    if not len(house.places):
+        return house.places
+    return house.places[rng.permutation(len(house.places))[: math.floor((1 - FLOOR_SHARE) * points)]]
+
+
+def _keep_away(house: CompiledHouse, on_top: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the points (k, 2) from which points on the floor keep a distance, in metres."""
+    return np.array([*(r.center[:2] for r in house.receptacles.values()), *on_top[:, :2]])
 
 
 def sample_points(
@@ -140,9 +160,11 @@ def sample_points(
     )
 
 
-def points_that_fit(navigable: NavigablePoints, keep_away: NDArray[np.float64], count: int = POINTS) -> int:
+def points_that_fit(house: CompiledHouse, navigable: NavigablePoints, count: int = POINTS) -> int:
     """Try once to draw `count` points for objects in a house, and return how many were found."""
-    return len(_pack(navigable, keep_away, count, np.random.default_rng(0)))
+    rng = np.random.default_rng(0)
+    on_top = _places_on_furniture(house, count, rng)
+    return len(on_top) + len(_pack(navigable, _keep_away(house, on_top), count - len(on_top), rng))
 
 
 def _pack(
@@ -198,13 +220,17 @@ def _point_models(catalogue: Catalogue, categories: Sequence[str], rng: np.rando
 
 
 def _drop(episode: Episode, catalogue: Catalogue, rng: np.random.Generator) -> Episode:
-    dropped = tuple(_above_floor(o, rng) for o in episode.objects)
+    dropped = tuple(_above_surface(o, rng) for o in episode.objects)
     for _ in range(DROPS):
         settled = settle(replace(episode, objects=dropped), catalogue)
-        if not settled.faults:
+        faults = settled.faults | _fallen(episode.objects, settled.objects)
+        if not faults:
             return replace(episode, objects=settled.objects)
-        dropped = tuple(_above_floor(o, rng) if o.name in settled.faults else o for o in dropped)
-    name, fault = next(iter(settled.faults.items()))
+        dropped = tuple(
+            _above_surface(o, rng) if o.name in faults else last
+            for o, last in zip(episode.objects, dropped, strict=True)
+        )
+    name, fault = next(iter(faults.items()))
     model = next(o.model for o in episode.objects if o.name == name)
     raise SamplingError(
         f"{name}, a {model!r}, {fault} in each of {DROPS} drops at seed {episode.seed}; flatten the model, "
@@ -212,10 +238,18 @@ def _drop(episode: Episode, catalogue: Catalogue, rng: np.random.Generator) -> E
     )
 
 
-def _above_floor(placed: PlacedObject, rng: np.random.Generator) -> PlacedObject:
+def _fallen(placed: Sequence[PlacedObject], settled: Sequence[PlacedObject]) -> dict[str, str]:
+    """Return a fault for each object that is below the surface onto which it was dropped."""
+    pairs = zip(placed, settled, strict=True)
+    return {a.name: "fell off furniture" for a, b in pairs if b.position[2] < a.position[2] - MAX_FALL}
+
+
+def _above_surface(placed: PlacedObject, rng: np.random.Generator) -> PlacedObject:
     yaw, height = rng.uniform(-math.pi, math.pi), rng.uniform(*DROP)
     quaternion = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
-    return replace(placed, position=(*placed.point, float(height)), quaternion=quaternion)
+    return replace(
+        placed, position=(*placed.point, placed.position[2] + float(height)), quaternion=quaternion
+    )
 
 
 def _start(episode: Episode, navigable: NavigablePoints, rng: np.random.Generator) -> StartPose:

@@ -1,4 +1,5 @@
 import itertools
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -6,7 +7,7 @@ import pytest
 from houses_cases import BINS, PALETTE, flat, studio
 
 from mjsim.generator.furnish import FurnishedHome, Furnishing, furnish, furnish_home
-from mjsim.generator.furniture.piece import flattened, moved
+from mjsim.generator.furniture.piece import BIN_SIZES, flattened, intersect, moved, moved_boxes
 from mjsim.generator.space import Space
 from mjsim.generator.values import HomePlan, Placement, Rectangle
 from mjsim.values.errors import HouseError
@@ -47,6 +48,62 @@ def test_nothing_stands_in_doorways_or_where_somebody_has_to_stand(home: Furnish
                 box = Rectangle(*moved(part.spot, place.x, place.y, place.yaw))
                 if piece.kind != "radiator":
                     assert not any(box.overlaps(zone, 0.002) for zone in free if zone not in own), piece.kind
+
+
+def test_nothing_that_is_drawn_overlaps(home: FurnishedHome) -> None:
+    for space in home.spaces:
+        stood = [
+            (piece.kind, moved_boxes(piece.drawn, at.x, at.y, at.yaw))
+            for piece, at in space.stood
+            if piece.stands not in ("ceiling", "recess")
+        ]
+        for (one, boxes), (other, others) in itertools.combinations(stood, 2):
+            assert not intersect(boxes, others), (one, other)
+
+
+def test_no_bin_is_beside_a_door(home: FurnishedHome) -> None:
+    for mount in home.mounts:
+        room = home.plan.room(mount.room)
+        x, y, _ = mount.position
+        w, d, _ = BIN_SIZES[mount.receptacle]
+        half = (d, w) if mount.quarter_turns % 2 else (w, d)
+        box = Rectangle(x - half[0] / 2, y - half[1] / 2, x + half[0] / 2, y + half[1] / 2)
+        for door in home.plan.doors_of(mount.room):
+            reach = door.width / 2 + 0.35
+            side = door.side_in(mount.room)
+            zone = room.floor.along(side, door.center - reach, door.center + reach, 0, 0.6)
+            assert not box.overlaps(zone, 0.001), mount
+
+
+def test_seats_around_a_table_face_a_television_or_stove(home: FurnishedHome) -> None:
+    lounges = [
+        p for s in home.spaces if s.room.use == "living_room" for p, _ in s.stood if p.kind == "lounge"
+    ]
+    assert len(lounges) == sum(room.use == "living_room" for room in home.plan.rooms)
+    for lounge in lounges:
+        poses = {piece.kind: (x, y, yaw) for piece, x, y, yaw in flattened(lounge)}
+        focus = poses.get("television", poses.get("stove"))
+        seat = next(poses[kind] for kind in ("sofa", "corner_sofa", "armchair") if kind in poses)
+        assert focus is not None and seat[1] - focus[1] > 1.5 and abs(seat[0] - focus[0]) < 1.0
+        assert math.cos(seat[2]) < -0.99  # turned to the television
+
+
+def test_objects_on_furniture_can_be_taken(home: FurnishedHome) -> None:
+    places = home.furnishing().places
+    assert len(places) >= len(home.spaces)
+    for one, other in itertools.combinations(places, 2):
+        assert math.dist(one[:2], other[:2]) >= 0.6
+    for place, mount in itertools.product(places, home.mounts):
+        assert math.dist(place[:2], mount.position[:2]) >= 1.0
+
+
+def test_a_place_behind_something_is_no_place() -> None:
+    space = Space.of(studio(), studio().rooms[1], np.random.default_rng(0))
+    x, y = space.room.floor.center
+    space.hit.append((x - 0.3, y - 0.3, x + 0.3, y + 0.3))
+    assert space.can_take((x, y - 0.15, 0.7))
+    space.drawn = np.vstack([space.drawn, [x - 0.3, y - 0.35, 0.7, x + 0.3, y - 0.3, 0.95]])
+    assert not space.can_take((x, y - 0.15, 0.7))
 
 
 def test_all_places_of_use_can_be_reached(home: FurnishedHome) -> None:

@@ -1,3 +1,6 @@
+import math
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
@@ -5,7 +8,10 @@ from houses_cases import PALETTE, compiled
 
 from mjsim.generator.furniture.appearance import Appearance, draw_appearance
 from mjsim.generator.furniture.catalogue import KINDS
-from mjsim.generator.furniture.piece import Piece
+from mjsim.generator.furniture.drawn_boxes import drawn_boxes
+from mjsim.generator.furniture.piece import BIN_SIZES, Piece, intersect
+from mjsim.house.validation.checked_model import Compiled
+from mjsim.house.validation.drawn import coplanar_faces
 
 SLACK = 0.03  # m
 
@@ -79,6 +85,67 @@ def test_what_collides_is_within_the_parts(pieces: list[tuple[Piece, mujoco.MjMo
                 )
                 or len(boxes) > 1
             ), (low[k], high[k])
+
+
+def test_the_boxes_of_a_piece_are_those_of_its_drawn_geoms(
+    pieces: list[tuple[Piece, mujoco.MjModel]],
+) -> None:
+    """MuJoCo's boxes around rotated ellipsoids and cylinders are too large, so only upright geoms are equal."""
+    for piece, model in pieces:
+        if piece.members:
+            continue
+        low, high = extents(model)
+        solid = [g for g in range(model.ngeom) if model.geom_type[g] != mujoco.mjtGeom.mjGEOM_PLANE]
+        drawn = [k for k, g in enumerate(solid) if model.geom_group[g] != 3]
+        for box, k in zip(piece.drawn, drawn, strict=False):
+            assert (box[:3] >= low[k] - 1e-3).all() and (box[3:] <= high[k] + 1e-3).all()
+            if model.geom_quat[solid[k], 0] == 1.0:
+                assert (*box[:3], *box[3:]) == pytest.approx((*low[k], *high[k]), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("geom", "half"),
+    [
+        ('type="ellipsoid" size=".3 .1 .1" euler="0 0 0.785398"', (math.sqrt(0.05), math.sqrt(0.05), 0.1)),
+        ('type="capsule" size=".05" fromto="-.2 0 0 .2 0 0"', (0.25, 0.05, 0.05)),
+        ('type="cylinder" size=".05" fromto="-.2 0 0 .2 0 0"', (0.2, 0.05, 0.05)),
+        ('type="cylinder" size=".1 .02" euler="1.570796 0 0"', (0.1, 0.02, 0.1)),
+        ('size=".3 .2 .01" xyaxes="-1 0 0 0 0 1"', (0.3, 0.01, 0.2)),
+        ('class="wall_x" size=".3 .2 .01"', (0.01, 0.3, 0.2)),
+        ('type="sphere" size=".1"', (0.1, 0.1, 0.1)),
+    ],
+)
+def test_the_box_of_a_rotated_geom_is_tight(geom: str, half: tuple[float, ...]) -> None:
+    found = drawn_boxes(f"<geom {geom}/>")
+    assert found == pytest.approx(np.array([[*(-v for v in half), *half]]), abs=1e-5)
+
+
+def test_guards_and_shadows_are_not_drawn() -> None:
+    assert not len(drawn_boxes('<geom class="guard" size="1 1 1"/><geom class="shadow" size="1 1 1"/>'))
+
+
+def test_no_faces_of_a_piece_flicker(pieces: list[tuple[Piece, mujoco.MjModel]]) -> None:
+    for piece, model in pieces:
+        found = coplanar_faces(Compiled.of("piece", Path("piece.xml"), model))
+        assert not [f for f in found if f.place[1] > 0.002], piece.kind  # the back faces a wall
+
+
+def test_bins_on_furniture_overlap_nothing(pieces: list[tuple[Piece, mujoco.MjModel]]) -> None:
+    for piece, _ in pieces:
+        for mount in piece.mounts:
+            (x0, y0, x1, y1), z = mount.spot, mount.position[2]
+            box = np.array([[x0, y0, z, x1, y1, z + BIN_SIZES[mount.receptacle][2]]])
+            assert not intersect(box, piece.drawn[np.abs(piece.drawn - box).max(axis=1) > 1e-3]), piece.kind
+
+
+def test_places_are_on_surfaces_that_collide(pieces: list[tuple[Piece, mujoco.MjModel]]) -> None:
+    for piece, model in pieces:
+        low, high = extents(model)
+        solid = [g for g in range(model.ngeom) if model.geom_type[g] != mujoco.mjtGeom.mjGEOM_PLANE]
+        hard = np.array([bool(model.geom_contype[g]) for g in solid])
+        for x, y, z in piece.places:
+            under = hard & (low[:, :2] <= (x, y)).all(axis=1) & (high[:, :2] >= (x, y)).all(axis=1)
+            assert np.abs(high[under, 2] - z).min() < 0.012, piece.kind
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))

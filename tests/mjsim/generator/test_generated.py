@@ -13,6 +13,7 @@ from mjsim.generator.files import house_files
 from mjsim.generator.generated import generate
 from mjsim.generator.home_cache import load_catalogue
 from mjsim.generator.recipe import read_recipe
+from mjsim.generator.views import landscapes
 from mjsim.house.catalogue.generated_names import VERSION, generated_names, parse_name, split_of
 from mjsim.house.catalogue.house_ref import models_root
 from mjsim.house.check import check_path
@@ -36,9 +37,24 @@ def test_another_process_makes_the_same_bytes() -> None:
 def test_a_house_can_be_used_and_holds_as_many_objects_as_it_says(rooms: int) -> None:
     report = check_path(f"generated:11?rooms={rooms}", load=load_catalogue)
     assert not report.findings
+    assert report.facts["drawn overlaps"] == report.facts["flickering faces"] == "none"
     catalogue = load_catalogue(f"generated:11?rooms={rooms}")
     assert len(catalogue.rooms) == rooms
+    assert (catalogue.points or 0) >= (24 if rooms >= 4 else 14)
     assert len(sample_episode(catalogue, objects=8, seed=5).objects) == 8
+
+
+def test_the_windows_of_a_house_have_different_views() -> None:
+    images = {asset.name: asset.image for asset in landscapes(11) if asset.image}
+    assert len(images) == len(set(images.values())) == 4
+    assert images == {asset.name: asset.image for asset in landscapes(11) if asset.image}
+    assert not set(images.values()) & {asset.image for asset in landscapes(12)}
+    house = load_catalogue("generated:11?rooms=3").house_path
+    for side in ("north", "east", "south", "west"):
+        assert f'name="outside/{side}"' in house.read_text()
+        assert (house.parent / "textures" / f"view_{side}_image.png").read_bytes() == images[
+            f"view_{side}_image"
+        ]
 
 
 def test_a_house_is_recorded_with_its_rooms_and_the_version() -> None:
@@ -72,6 +88,7 @@ def test_a_recipe_of_another_version_is_refused(tmp_path: Path) -> None:
         ("generated:7?rooms=11", "has 11 rooms; ask for 1 to 10"),
         ("generated:7?size=3", "names no house"),
         ("generated:7?rooms=5&version=99", "version 99"),
+        ("generated:7?rooms=5&version=3", "makes other homes from the same seeds"),
     ],
 )
 def test_malformed_names_are_refused(name: str, message: str) -> None:

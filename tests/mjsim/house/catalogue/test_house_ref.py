@@ -21,9 +21,9 @@ RECORDED = {
     "other.toml": ("folder", "other.toml"),
     "/far/away.toml": ("folder", "/far/away.toml"),
     "mine/recipe.json": ("recipe", "mine/recipe.json"),
-    "generated:7": ("generated", "generated:7?rooms=5&version=3"),
-    "generated:7?rooms=5": ("generated", "generated:7?rooms=5&version=3"),
-    "generated:7?rooms=5&version=3": ("generated", "generated:7?rooms=5&version=3"),
+    "generated:7": ("generated", "generated:7?rooms=5&version=4"),
+    "generated:7?rooms=5": ("generated", "generated:7?rooms=5&version=4"),
+    "generated:7?rooms=5&version=4": ("generated", "generated:7?rooms=5&version=4"),
 }
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_worlds import episode_of
+from small_worlds import edited, episode_of
 
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import compiled_house
@@ -156,6 +156,46 @@ def test_bad_arguments_are_named(small_catalogue, arguments, message):
 def test_crowded_floor_says_how_much_was_tried(small_catalogue):
     with pytest.raises(SamplingError, match=r"of 40 points .* rejections"):
         sample_episode(small_catalogue, Floor(), objects=6, seed=0)
+
+
+TABLE = '<body name="table{0}" pos="{1} {2} 0.35"><geom type="box" size="0.3 0.3 0.35"/></body>'
+PLACE = '<site name="place:{0}" pos="{1} {2} 0.7"/>'
+TABLES = ((1.0, 0.6), (1.0, 3.4), (4.5, 0.6))
+
+
+@pytest.fixture
+def furnished(fresh_house):
+    parts = [text.format(i, *at) for i, at in enumerate(TABLES) for text in (TABLE, PLACE)]
+    return edited(fresh_house, "house.xml", "</worldbody>", "".join(parts) + "</worldbody>")
+
+
+def test_objects_lie_on_the_floor_and_at_the_places_on_furniture(furnished):
+    assert compiled_house(furnished).places.tolist() == [[*at, 0.7] for at in TABLES]
+    for seed in range(4):
+        episode = sample_episode(furnished, Floor(), objects=6, seed=seed, points=6)
+        high = [o for o in episode.objects if o.position[2] > 0.6]
+        assert {o.point for o in high} == set(TABLES)
+        assert all(abs(o.position[2]) < 0.1 for o in episode.objects if o not in high)
+        floor = [o.point for o in episode.objects if o not in high]
+        assert min(math.dist(a, b) for a in floor for b in (*TABLES, *floor) if a != b) >= 1.0
+
+
+def test_at_least_two_of_five_points_are_on_the_floor(furnished):
+    for points, most in ((1, 0), (2, 1), (4, 2), (5, 3), (6, 3)):
+        found = sampling.house_points(furnished, Floor(), seed=0, points=points).tolist()
+        assert len(found) == points and sum(tuple(point) in TABLES for point in found) == most
+
+
+def test_the_first_objects_of_a_house_are_a_mixture(furnished):
+    points = [sampling.house_points(furnished, Floor(), seed=seed, points=6) for seed in range(12)]
+    assert 2 <= sum(tuple(pool[0].tolist()) in TABLES for pool in points) <= 10
+
+
+def test_an_object_that_falls_off_furniture_is_refused(fresh_house):
+    beside = PLACE.format(0, 2.0, 2.0)  # there is no table below
+    catalogue = edited(fresh_house, "house.xml", "</worldbody>", beside + "</worldbody>")
+    with pytest.raises(SamplingError, match="fell off furniture in each of 8 drops"):
+        sample_episode(catalogue, Floor(), objects=2, seed=0, points=2)
 
 
 @settings(max_examples=25, deadline=None)
