@@ -127,7 +127,11 @@ def test_the_file_of_init_goes_through_all_commands(tmp_path, study, capsys):
     names = [str(study), str(served)]
     assert main(["study", "collect", *names, "--out", str(table)]) == 0
     (row, _) = pq.read_table(table / "trials.parquet").to_pylist()
-    assert row["mood:Mood_calm"] in (1, 2, 3, 4) and row["likert_calm"] in (1, 2, 3, 4, 5) and not row["inattentive"]
+    assert (
+        row["mood:Mood_calm"] in (1, 2, 3, 4)
+        and row["likert_calm"] in (1, 2, 3, 4, 5)
+        and not row["inattentive"]
+    )
     assert main(["study", "analyze", str(table), "--exclude", str(study)]) == 0, capsys.readouterr().err
     assert main(["study", "export", *names, "--out", str(tmp_path / "export")]) == 0
     assert main(["study", "pay", *names]) == 0

@@ -5,6 +5,7 @@ import hashlib
 import re
 import sqlite3
 import threading
+import time
 from contextlib import closing, contextmanager
 
 import msgspec
@@ -223,10 +224,17 @@ def test_the_welcome_page_waits_for_the_picture_of_the_house(tmp_path, study, mo
     picture, unfinished = tmp_path / "view.webp", tmp_path / "unfinished"
     monkeypatch.setattr("experiments.study.plan.view_path", lambda *_: picture)
     with serving(tmp_path, study) as client:
-        assert 'src="/house.webp" alt="The largest room of the apartment"' in client.get("/").text
+        assert (
+            'class="view" role="img" aria-label="The largest room of the apartment"' in client.get("/").text
+        )
         with monkeypatch.context() as impatient:
             impatient.setattr("experiments.visit.server.app.DRAWING_TIMEOUT", 0.0)
             assert client.get("/house.webp").status_code == 404
+        picture.touch()  # it cannot be drawn
+        began = time.monotonic()
+        assert client.get("/house.webp").status_code == 404 and time.monotonic() - began < 30.0
+        assert 'class="view"' not in client.get("/").text
+        picture.unlink()
         unfinished.write_bytes(b"a picture")
         drawing = threading.Timer(0.5, lambda: unfinished.rename(picture))
         drawing.start()

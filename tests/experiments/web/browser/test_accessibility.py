@@ -22,7 +22,10 @@ pytestmark = pytest.mark.slow
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 DESK = {"viewport": {"width": 1280, "height": 720}}
-ZOOM = {"viewport": {"width": 640, "height": 360}, "device_scale_factor": 2}  # the window of DESK at 200 % zoom
+ZOOM = {
+    "viewport": {"width": 640, "height": 360},
+    "device_scale_factor": 2,
+}  # the window of DESK at 200 % zoom
 LOOKS = (DESK, PHONE, ZOOM)
 PROLIFIC = """
 [study.recruitment]
