@@ -1,4 +1,4 @@
-"""Subcommands of `mjsim study` that manage study data: collect, export, backup, restore, erase and forget."""
+"""Subcommands of `mjsim study` that manage study data, such as collect, export, backup and erase."""
 
 import argparse
 import sys
@@ -41,6 +41,12 @@ who did not agree or who wanted their data deleted. The folder is written atomic
 
 Free-text answers are in a separate table: read them before you publish the export."""
 
+RECONCILE = """\
+Mark participants that the recruitment platform does not know, such as those with invented ids. SUBMISSIONS is the list
+of the study's submissions (CSV) from the page of Prolific, Connect or the ExternalQuestion platform. A participant is
+known if the ids of person and submission are in the same line. Collected tables have the column recruitment_known, for
+[exclusions]. Repeat the command with a newer list at any time."""
+
 BACKUP = """\
 Write a consistent snapshot of a study's database to a new file, even while the study is served. The backup does not
 include journals and run directories: copy the folder DIR as well."""
@@ -72,6 +78,13 @@ def add_parser(commands: Any) -> None:
     parser = _add(commands, "export", run_export, "export all data of a study", EXPORT)
     parser.add_argument("--out", type=Path, required=True, metavar="EXPORT", help="folder to create")
     add_force(parser, "replace an earlier export")
+    parser = _add(
+        commands, "reconcile", run_reconcile, "mark participants that the platform does not know", RECONCILE
+    )
+    parser.add_argument("submissions", type=Path, metavar="SUBMISSIONS.csv", help="list from the platform")
+    parser.add_argument(
+        "--who", default="mjsim", metavar="NAME", help="name of the person who does this, for the audit log"
+    )
     parser = _add(commands, "backup", run_backup, "back up the database of a study", BACKUP)
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.db", help="file to write")
     parser = add_command(
@@ -149,6 +162,17 @@ def run_export(arguments: argparse.Namespace) -> int:
     _print_faults(found.collected.unusable)
     print(f"{arguments.out} ({found.people} people, {found.runs} runs)")
     return 1 if found.collected.unusable else 0
+
+
+def run_reconcile(arguments: argparse.Namespace) -> int:
+    study = people_study(arguments)
+    from experiments.study.data.reconcile import reconcile
+
+    file, who = arguments.submissions, arguments.who
+    known = with_store(study, arguments, lambda store: reconcile(study, store, file, who))
+    print(f"{sum(known.values())} of {len(known)} participants are known to the platform")
+    print(f"unknown: {', '.join(name for name in known if not known[name]) or 'no participant'}")
+    return 0
 
 
 def run_backup(arguments: argparse.Namespace) -> int:
