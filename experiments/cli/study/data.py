@@ -1,6 +1,7 @@
 """Subcommands of `mjsim study` that manage study data, such as collect, export, backup and erase."""
 
 import argparse
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,8 @@ from mjsim.support.urls import redacted
 
 if TYPE_CHECKING:
     from experiments.visit.store import Store
+
+_USER = re.compile(r"[^/]*:[^/]*@")  # the start of a URL without its scheme, which may contain a password
 
 COLLECT = """\
 Write what the participants of a study did and answered as tidy tables: OUT/trials.parquet and OUT/trials.csv with a row
@@ -197,6 +200,10 @@ def run_restore(arguments: argparse.Namespace) -> int:
 
     url = arguments.database
     if "://" not in url:
+        if _USER.match(url):
+            raise ConfigError(
+                "DATABASE names a user but no kind; write it as postgresql://USER:PASSWORD@HOST/NAME"
+            )
         note_derived(Path(url), "database", Path(url))
         note_derived(arguments.backup, "database", Path(url))
     run_until_signal(restore(arguments.backup, url if "://" in url else sqlite_url(Path(url))))

@@ -10,9 +10,8 @@ from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.errors import StoreError
 from experiments.visit.store.part import StorePart, new_id, note
-from experiments.visit.store.tables import answer
+from experiments.visit.store.tables import answer, person
 from experiments.visit.store.tables import identity as ids
-from experiments.visit.store.tables import person
 from experiments.visit.store.values import PersonRow, Status, utc_now
 
 _FIELDS = (
@@ -118,7 +117,10 @@ class People(StorePart):
         given = {"phase": "recruitment", "item": "known", "given": now, "final": True}
 
         async def work(connection: AsyncConnection) -> None:
-            mine = (answer.c.person_id.in_(known), *(answer.c[name] == given[name] for name in ("phase", "item")))
+            mine = (
+                answer.c.person_id.in_(known),
+                *(answer.c[name] == given[name] for name in ("phase", "item")),
+            )
             await connection.execute(delete(answer).where(*mine))
             for number, value in known.items():
                 await connection.execute(insert(answer), {"person_id": number, "value": value, **given})

@@ -25,7 +25,9 @@ MIN_DISTANCE = 1.0  # minimum distance between two points, or a point and a rece
 START_CLEARANCE = 0.5  # minimum distance from the person's start position to any object, in metres
 DROP = (0.01, 0.02)  # range of heights from which objects are dropped, in metres
 PACKINGS, DRAWS = 20, 4000  # Incomplete sets of points are discarded to keep the distribution uniform.
-MAX_RATIO = 7  # Each point blocks at most seven points of another set, so no set has more than seven times as many.
+MAX_RATIO = (
+    7  # Each point blocks at most seven points of another set, so no set has more than seven times as many.
+)
 DROPS = 8
 MAX_POINTS = 1000
 LEAST_VIEW = 0.6  # minimum distance between the start position and a wall ahead, in metres
@@ -128,17 +130,17 @@ def sample_points(
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
     """Draw walkable points (count, 2) that are far from each other and from `keep_away` (k, 2), in metres."""
-    best = packings = 0
-    for packings in range(1, PACKINGS + 1):
+    found: list[int] = []
+    for _ in range(PACKINGS):
         points = _pack(navigable, keep_away, count, rng)
         if len(points) == count:
             return points
-        best = max(best, len(points))
-        if count > MAX_RATIO * best:
+        found.append(len(points))
+        if count > MAX_RATIO * len(points):
             break
     raise SamplingError(
-        f"only {best} of {count} points fit at least {MIN_DISTANCE} m from each other and from "
-        f"{len(keep_away)} receptacles, after {packings * DRAWS - best} rejections; "
+        f"only {max(found)} of {count} points fit at least {MIN_DISTANCE} m from each other and from "
+        f"{len(keep_away)} receptacles, after {len(found) * DRAWS - max(found)} rejections; "
         "ask for fewer points (--points) or use a larger house"
     )
 

@@ -30,7 +30,12 @@ screened_out = "C2"
 no_consent = "C3"
 """
 LIST = "\ufeffSubmission id;Participant id\r\nsubmission0001,person000001\r\nsubmission0002,person000002\n"
-ARRIVED = ((1, 1), (2, 2), (3, 3), (1, 2))  # numbers in the ids of person and submission; the list has the first two
+ARRIVED = (
+    (1, 1),
+    (2, 2),
+    (3, 3),
+    (1, 2),
+)  # numbers in the ids of person and submission; the list has the first two
 
 
 @pytest.fixture
