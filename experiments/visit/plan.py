@@ -104,6 +104,11 @@ class VisitPlan:
         return self.picture is not None and (not self.picture.is_file() or self.picture.stat().st_size > 0)
 
     @property
+    def scene(self) -> str:
+        """URL path of the house's scene files, which are in the same folder as the picture, or an empty text."""
+        return f"/scene/{self.picture.parent.name}/" if self.picture else ""
+
+    @property
     def story_paragraphs(self) -> list[str]:
         """The paragraphs of the story."""
         return [part for part in self.story.split("\n\n") if part.strip()]
