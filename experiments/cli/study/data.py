@@ -169,7 +169,7 @@ def run_export(arguments: argparse.Namespace) -> int:
 
 def run_reconcile(arguments: argparse.Namespace) -> int:
     study = people_study(arguments)
-    from experiments.study.data.reconcile import reconcile
+    from experiments.study.recruitment.reconcile import reconcile
 
     file, who = arguments.submissions, arguments.who
     known = with_store(study, arguments, lambda store: reconcile(study, store, file, who))
