@@ -201,9 +201,7 @@ def run_restore(arguments: argparse.Namespace) -> int:
     url = arguments.database
     if "://" not in url:
         if _USER.match(url):
-            raise ConfigError(
-                "DATABASE names a user but no kind; write it as postgresql://USER:PASSWORD@HOST/NAME"
-            )
+            raise ConfigError("DATABASE begins with a user; write it as postgresql://USER:PASSWORD@HOST/NAME")
         note_derived(Path(url), "database", Path(url))
         note_derived(arguments.backup, "database", Path(url))
     run_until_signal(restore(arguments.backup, url if "://" in url else sqlite_url(Path(url))))

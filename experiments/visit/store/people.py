@@ -112,7 +112,7 @@ class People(StorePart):
             return dict((await connection.execute(query)).scalar() or {})
 
     async def set_known(self, known: Mapping[int, bool], who: str) -> None:
-        """Record if the recruitment platform knows each participant, as the answer `known` of `recruitment`."""
+        """Record if the recruitment platform knows each participant, as the answer `known` in `recruitment`."""
         now = utc_now()
         given = {"phase": "recruitment", "item": "known", "given": now, "final": True}
 

@@ -25,9 +25,8 @@ MIN_DISTANCE = 1.0  # minimum distance between two points, or a point and a rece
 START_CLEARANCE = 0.5  # minimum distance from the person's start position to any object, in metres
 DROP = (0.01, 0.02)  # range of heights from which objects are dropped, in metres
 PACKINGS, DRAWS = 20, 4000  # Incomplete sets of points are discarded to keep the distribution uniform.
-MAX_RATIO = (
-    7  # Each point blocks at most seven points of another set, so no set has more than seven times as many.
-)
+# Maximum ratio of the sizes of two sets of points that cannot be extended: each point blocks at most seven others
+MAX_RATIO = 7
 DROPS = 8
 MAX_POINTS = 1000
 LEAST_VIEW = 0.6  # minimum distance between the start position and a wall ahead, in metres

@@ -18,6 +18,9 @@ const COARSEST = 0.5; // lowest resolution before the server draws, as a share o
 const MAX_RATIO = 2; // most drawn pixels per CSS pixel in each direction
 const RESTORED_WITHIN = 5000; // how long a lost context may take to return, in ms
 
+/** Returns the resolution to draw with, as a share of the display's. @param {number} scale that share without `MAX_RATIO` */
+export const resolution = (scale) => scale * Math.min(1, MAX_RATIO / (window.devicePixelRatio || 1));
+
 /**
  * @typedef {object} Events
  * @property {(message: View | Draw | { type: "seen", frame: number }) => void} send
@@ -106,8 +109,7 @@ export class Picture {
 
   /** Adapts the drawing to the size of the view. */
   resize() {
-    const ratio = window.devicePixelRatio || 1;
-    this.drawn?.world.resize(this.#scale * Math.min(1, MAX_RATIO / ratio));
+    this.drawn?.world.resize(resolution(this.#scale));
   }
 
   /** Returns the view to request from the server. @returns {View} */

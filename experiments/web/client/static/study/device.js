@@ -2,7 +2,7 @@
 
 import { byId, within } from "../dom.js";
 import { World3D } from "../drawing/world.js";
-import { COARSER, SLOWEST } from "../picture.js";
+import { COARSER, SLOWEST, resolution } from "../picture.js";
 
 const TRIPS = 5; // number of round trips to the server
 const MEASURED = 1500; // duration of the frame rate measurement, in ms
@@ -32,45 +32,43 @@ function measureScreen() {
   });
 }
 
-/**
- * Loads the apartment. Returns a function that draws what a person sees after a share of a walk through all rooms, or
- * draws nothing if the apartment cannot be loaded.
- * @returns {Promise<(share: number, scale: number) => void>}
- */
-async function apartment() {
-  const canvas = byId("apartment", HTMLCanvasElement);
+/** Loads the apartment, or returns null if this fails. @param {HTMLCanvasElement} canvas */
+async function apartment(canvas) {
   try {
     const world = new World3D(canvas);
     const { rooms } = await world.load((name) => (canvas.dataset["scene"] ?? "") + name);
-    return (share, scale) => {
+    /** Draws the view after a share of a walk through all rooms. @param {number} share */
+    const draw = (share) => {
       const polygon = rooms[Math.floor(share * rooms.length)]?.polygon ?? [];
       const [x, y] = [0, 1].map((axis) => polygon.reduce((sum, point) => sum + (point[axis] ?? 0) / polygon.length, 0));
-      if (!share) world.resize(scale);
       world.setEye({ position: [x ?? 0, y ?? 0, EYE_HEIGHT], heading: 2 * Math.PI * share * rooms.length, pitch: 0 });
       world.draw();
     };
+    return { world, draw };
   } catch {
-    return () => {};
+    return null;
   }
 }
 
 /** Measures the frame rate as a trial would draw, with a lower resolution if necessary. */
 async function measureFrames() {
-  const draw = await apartment();
+  const canvas = byId("apartment", HTMLCanvasElement);
+  const view = await apartment(canvas);
   let rate = 0;
   for (const scale of [1, COARSER]) {
-    draw(0, scale); // the first frame takes longer
+    view?.world.resize(resolution(scale));
+    view?.draw(0); // the first frame takes longer
     const began = await nextFrame();
     let [frames, now] = [0, began];
     while (now - began < MEASURED) {
-      draw(Math.max(1e-6, (now - began) / MEASURED), scale);
+      view?.draw((now - began) / MEASURED);
       now = await nextFrame();
       frames++;
     }
     rate = (1000 * frames) / (now - began);
     if (rate >= SLOWEST) break;
   }
-  byId("apartment", HTMLCanvasElement).remove();
+  canvas.remove();
   tell("frames", rate.toFixed(0), { frames_per_s: rate.toFixed(1) });
 }
 
