@@ -165,6 +165,9 @@ def _merge(design: Design, out: Path, parts: list[Path], workers: int | None) ->
     shards = (
         f"{', '.join(incomplete[:MAX_SHARDS_SHOWN])}{more}" if incomplete else "the shards that hold them"
     )
+    todo = f"run again {shards}, then merge again"
+    if others and len(merged.missing) == len(design.trials):
+        todo = "give --merge the DESIGN.toml or the options with which the shards were run"
     lost = f"{len(merged.missing)} of {len(design.trials)} trials are missing"
-    console.print(f"mjsim: {lost}: run again {shards}, then merge again", style="red", soft_wrap=True)
+    console.print(f"mjsim: {lost}: {todo}", style="red", soft_wrap=True)
     return 1

@@ -38,16 +38,22 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from experiments.record.run_directory import check_file
+    from mjsim.generator.home_cache import load_catalogue
+    from mjsim.house.catalogue.files import read_labels
+    from mjsim.house.catalogue.house_ref import models_root
 
     if arguments.out.suffix != ".mp4":
         raise ConfigError(f"cannot film to {arguments.out}: name a file that ends in .mp4")
     check_file(arguments.out, replace=arguments.force)
+    language, folder = arguments.language, load_catalogue(arguments.house).folder
+    if language != "en" and not read_labels(language, (models_root(), folder)):
+        raise ConfigError(f"no labels in language {language!r}; write labels.{language}.toml in {folder}")
     frames = film_house(
         arguments.house,
         arguments.out,
         film_config(arguments, panels=False),
         arguments.seconds,
-        arguments.language,
+        language,
     )
     print(f"{arguments.out} (frames {frames})")
     return 0

@@ -90,6 +90,10 @@ def run(arguments: argparse.Namespace) -> int:
         from experiments.record.run_directory import check_file  # imported here to speed up the start
 
         check_file(arguments.certificate, replace=arguments.force)
+        if arguments.certificate.resolve() == Path(arguments.file).resolve():
+            raise ConfigError(
+                f"{arguments.certificate} is the problem; name another file for the certificate"
+            )
     started, seconds = time.perf_counter(), arguments.time_limit
     if seconds is not None and not 0 < seconds < math.inf:
         raise ConfigError(f"--time-limit {seconds:g} must be positive and finite; give seconds")

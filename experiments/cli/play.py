@@ -31,6 +31,7 @@ from experiments.cli.study.database import DATABASE, sqlite_url
 from experiments.errors import ConfigError
 from experiments.record.phases import FLYTHROUGH, HUMAN, PHASES, STORY, TASK, phases_of
 from experiments.trials.trial_config import TrialConfig
+from experiments.visit.texts import languages
 from experiments.visit.texts.items import Item
 from hud.conditions import condition
 from mjsim.house.catalogue.files import catalogue_file
@@ -86,7 +87,13 @@ def add_parser(commands: Any) -> None:
         metavar="S",
         help="seconds without a heartbeat after which a person's slot is given to another person",
     )
-    group.add_argument("--language", default="en", metavar="TAG", help="language of the pages: en or de")
+    group.add_argument(
+        "--language",
+        choices=languages(),
+        default="en",
+        metavar="TAG",
+        help="language of the pages: en or de",
+    )
     group.add_argument(
         "--film", type=Path, metavar="FILE.mp4", help="film of the house to show before the task"
     )
@@ -168,9 +175,9 @@ async def _serve_visits(
     from experiments.visit.server.app import ServerOptions, VisitServer
     from experiments.visit.store import Store
 
-    store = await Store.open(sqlite_url(arguments.out / DATABASE), NAME, "0" * 64)
-    folders = VisitFolders(arguments.out.absolute())
     plan = plan_of_play(arguments, task, shown_phases(arguments), questions)
+    store = await Store.open(sqlite_url(arguments.out / DATABASE), NAME, "0" * 64, alone=True)
+    folders = VisitFolders(arguments.out.absolute())
     procedure = Procedure(plan, store, folders, np.random.default_rng())
     await procedure.adopt()
     options = ServerOptions(proxies=arguments.trusted_proxy, workers=arguments.sessions)

@@ -243,7 +243,7 @@ class Displays:
         display_width: Width of the view in CSS pixels.
         display_height: Height of the view in CSS pixels.
         display_pixel_ratio: Screen pixels per CSS pixel.
-        display_frames_per_s: Frames shown per second.
+        display_frames_per_s: Frames shown per second. If the server draws, periods without changes do not count.
         display_frame_ms_95: 95th percentile of the time between two frames in milliseconds.
         display_latency_ms: Time in milliseconds from an input to the frame that shows it; None if nothing was pressed.
         display_dropped: Share of the received frames that were not shown.

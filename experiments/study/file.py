@@ -27,9 +27,9 @@ TEMPLATE = Path(__file__).with_name("template.toml")
 PLATFORMS = ("link", "lab", "prolific", "connect", "external-question")
 
 Money = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]
-Code = Annotated[str, msgspec.Meta(pattern="^[0-9A-Za-z_-]{0,64}$")]
+Code = Annotated[str, msgspec.Meta(pattern=r"^[0-9A-Za-z_-]{0,64}\Z")]
 # The origin of a web page, which consists of the scheme, the host and an optional port
-Site = Annotated[str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?$")]
+Site = Annotated[str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?\Z")]
 
 MAX_MINIMUM_S = 86400
 HERE = ("localhost", "127.0.0.1", "::1")  # hosts that may be contacted without TLS
@@ -42,13 +42,18 @@ class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 class Pay(_Table, frozen=True):
     """The payments to participants, in units of `currency`."""
 
-    currency: Annotated[str, msgspec.Meta(pattern="^[A-Z]{3}$")] = "USD"
+    currency: Annotated[str, msgspec.Meta(pattern=r"^[A-Z]{3}\Z")] = "USD"
     reward: Money = 0.0  # pay for completing the study
     screen_out: Money = 0.0  # pay for screened-out participants
     bonus_for_all: Money = 0.0  # bonus for putting all objects away
     fee: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)] | None = None  # platform fee as a share of the pay
     wage: Money = 0.0  # hourly wage below which `mjsim study check` reports a problem
     partial: bool = False  # if True, participants who leave during or after the task get part of the reward
+
+    def __post_init__(self) -> None:
+        for name in ("reward", "screen_out", "bonus_for_all"):
+            if (value := getattr(self, name)) != round(value, 2):
+                raise ValueError(f"{name} is {value}; amounts have at most two decimals")
 
 
 class Recruitment(_Table, frozen=True):
@@ -78,12 +83,12 @@ class Recruitment(_Table, frozen=True):
 class StudySettings(_Table, frozen=True):
     """The contents of the `[study]` table in a study file."""
 
-    name: Annotated[str, msgspec.Meta(pattern="^[a-z0-9][a-z0-9-]{0,39}$")]
-    title: str
+    name: Annotated[str, msgspec.Meta(pattern=r"^[a-z0-9][a-z0-9-]{0,39}\Z")]
+    title: Annotated[str, msgspec.Meta(pattern=r"\S")]
     institution: str
     contact: str
     minutes: Count = 25
-    language: Annotated[str, msgspec.Meta(pattern="^[a-zA-Z]{2,3}(-[a-zA-Z0-9]{2,8})*$")] = "en"
+    language: Annotated[str, msgspec.Meta(pattern=r"^[a-zA-Z]{2,3}(-[a-zA-Z0-9]{2,8})*\Z")] = "en"
     texts: str | None = None
     consent_version: str = "1"  # version of the consent text, which is stored with each agreement
     phases: tuple[str, ...] = PHASES

@@ -145,7 +145,7 @@ def inapplicable(exclusions: Exclusions, rows: Sequence[Row]) -> tuple[Rule, ...
     """Return the rules about measures that are only recorded from people, if all rows are simulated."""
     from experiments.record.metrics import Displays  # imported here so that commands start fast
 
-    from_people = {"inattentive", *(field.name for field in fields(Displays))}
+    from_people = {"inattentive", "recruitment_known", *(field.name for field in fields(Displays))}
     simulated = all(is_simulated(row.get("user")) for row in rows)
     return tuple(
         rule

@@ -65,7 +65,8 @@ class VisitPlan:
         cells: Cells of the design. Each participant is assigned a place in one of them.
         trials: Function that returns the settings of the trials for an assignment, by phase.
         poster: Data URL of the picture that the page of the film shows before the film is played, or an empty text.
-        picture: File of the picture on the welcome page, which workers may still be drawing, or None.
+        picture: File of the picture on the welcome page, or None. Workers may still be drawing it. The file is empty
+            if the picture cannot be drawn.
         headset: True if trials can be played with a VR headset.
         floor_plan: True if the run directory of the task includes a floor plan with the participant's path.
         rehearsal: True if all participants are simulated.
@@ -96,6 +97,16 @@ class VisitPlan:
     rehearsal: bool = False
     film_required: bool = False
     consent_version: str = "1"
+
+    @property
+    def has_picture(self) -> bool:
+        """True if the welcome page has a picture, including one that is still being drawn."""
+        return self.picture is not None and (not self.picture.is_file() or self.picture.stat().st_size > 0)
+
+    @property
+    def scene(self) -> str:
+        """URL path of the house's scene files, which are in the same folder as the picture, or an empty text."""
+        return f"/scene/{self.picture.parent.name}/" if self.picture else ""
 
     @property
     def story_paragraphs(self) -> list[str]:

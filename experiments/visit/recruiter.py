@@ -57,12 +57,14 @@ class Recruiter(Protocol):
     Attributes:
         platform: Name of the platform in the study file.
         parameters: Query parameters of the platform's links. The welcome page passes them on.
+        submission: Parameters with the ids of the person and of the submission, or empty if there are no such ids.
         has_time_limit: True if the platform limits the duration of visits.
         embedded_by: Origins of pages that may embed the study in a frame and receive its last form.
     """
 
     platform: str
     parameters: tuple[str, ...]
+    submission: tuple[str, ...]
     has_time_limit: bool
     embedded_by: tuple[str, ...]
 
@@ -83,6 +85,7 @@ class OpenLink:
         repeats: True if links for playing again contain the token of the earlier visit.
     """
 
+    submission: tuple[str, ...] = ()
     has_time_limit = False
     embedded_by: tuple[str, ...] = ()
 

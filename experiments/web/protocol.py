@@ -61,7 +61,7 @@ class View(WireMessage, frozen=True):
 class Hello(WireMessage, frozen=True):
     """The first message of a connection. `tab` is a random name that the page keeps when it reconnects."""
 
-    tab: Annotated[str, msgspec.Meta(pattern="^[A-Za-z0-9-]{8,64}$")]
+    tab: Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9-]{8,64}\Z")]
     trial: Annotated[str, msgspec.Meta(max_length=20)]
     view: View
 

@@ -1,6 +1,7 @@
-"""Subcommands of `mjsim study` that manage study data: collect, export, backup, restore, erase and forget."""
+"""Subcommands of `mjsim study` that manage study data, such as collect, export, backup and erase."""
 
 import argparse
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +25,8 @@ from mjsim.support.urls import redacted
 if TYPE_CHECKING:
     from experiments.visit.store import Store
 
+_USER = re.compile(r"[^/]*:[^/]*@")  # the start of a URL without its scheme, which may contain a password
+
 COLLECT = """\
 Write what the participants of a study did and answered as tidy tables: OUT/trials.parquet and OUT/trials.csv with a row
 per participant who ended the task, for `mjsim study analyze`, `compare` and `score`, and OUT/texts.csv with free-text
@@ -40,6 +43,12 @@ identify participants. The export has no platform ids, links, hashes of links or
 who did not agree or who wanted their data deleted. The folder is written atomically.
 
 Free-text answers are in a separate table: read them before you publish the export."""
+
+RECONCILE = """\
+Mark participants that the recruitment platform does not know, such as those with invented ids. SUBMISSIONS is the list
+of the study's submissions (CSV) from the page of Prolific, Connect or the ExternalQuestion platform. A participant is
+known if the ids of person and submission are in the same line. Collected tables have the column recruitment_known, for
+[exclusions]. Repeat the command with a newer list at any time."""
 
 BACKUP = """\
 Write a consistent snapshot of a study's database to a new file, even while the study is served. The backup does not
@@ -72,6 +81,13 @@ def add_parser(commands: Any) -> None:
     parser = _add(commands, "export", run_export, "export all data of a study", EXPORT)
     parser.add_argument("--out", type=Path, required=True, metavar="EXPORT", help="folder to create")
     add_force(parser, "replace an earlier export")
+    parser = _add(
+        commands, "reconcile", run_reconcile, "mark participants that the platform does not know", RECONCILE
+    )
+    parser.add_argument("submissions", type=Path, metavar="SUBMISSIONS.csv", help="list from the platform")
+    parser.add_argument(
+        "--who", default="mjsim", metavar="NAME", help="name of the person who does this, for the audit log"
+    )
     parser = _add(commands, "backup", run_backup, "back up the database of a study", BACKUP)
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.db", help="file to write")
     parser = add_command(
@@ -151,6 +167,17 @@ def run_export(arguments: argparse.Namespace) -> int:
     return 1 if found.collected.unusable else 0
 
 
+def run_reconcile(arguments: argparse.Namespace) -> int:
+    study = people_study(arguments)
+    from experiments.study.recruitment.reconcile import reconcile
+
+    file, who = arguments.submissions, arguments.who
+    known = with_store(study, arguments, lambda store: reconcile(study, store, file, who))
+    print(f"{sum(known.values())} of {len(known)} participants are known to the platform")
+    print(f"unknown: {', '.join(name for name in known if not known[name]) or 'no participant'}")
+    return 0
+
+
 def run_backup(arguments: argparse.Namespace) -> int:
     with_store(people_study(arguments), arguments, lambda store: _back_up(store, arguments))
     print(f"{arguments.out} (restore it with `mjsim study restore {arguments.out} {DATABASE}`)")
@@ -173,6 +200,8 @@ def run_restore(arguments: argparse.Namespace) -> int:
 
     url = arguments.database
     if "://" not in url:
+        if _USER.match(url):
+            raise ConfigError("DATABASE begins with a user; write it as postgresql://USER:PASSWORD@HOST/NAME")
         note_derived(Path(url), "database", Path(url))
         note_derived(arguments.backup, "database", Path(url))
     run_until_signal(restore(arguments.backup, url if "://" in url else sqlite_url(Path(url))))

@@ -43,6 +43,8 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     if arguments.what != "list" and not arguments.name:
         raise ConfigError(f"`{arguments.what}` needs the NAME of an account")
+    if arguments.what == "list" and arguments.name:
+        raise ConfigError(f"`list` lists all accounts; leave out {arguments.name!r}")
     if arguments.what == "add" and not arguments.role:
         raise ConfigError(f"`add` needs --role: {', '.join(ROLES)}")
     study, adds = people_study(arguments), arguments.what == "add"

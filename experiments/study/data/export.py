@@ -39,6 +39,7 @@ OWN = {
     "reason": "Reason for the end of the phase.",
     "item": "Name of the item.",
     "answer": "Answer. Scales are numbers from 1. Several choices are joined by semicolons.",
+    "recruitment_known": "True if the recruitment platform lists the participant's submission.",
     "inattentive": "Number of wrong answers to survey items with a right answer.",
     "text": "Free-text answer. An apostrophe precedes texts that a spreadsheet would evaluate.",
 }

@@ -23,6 +23,7 @@ class Connect:
 
     platform = "connect"
     parameters: tuple[str, ...] = (PERSON, ASSIGNMENT, PROJECT)
+    submission: tuple[str, ...] = (PERSON, ASSIGNMENT)
     has_time_limit = True
     embedded_by: tuple[str, ...] = ()
 

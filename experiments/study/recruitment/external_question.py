@@ -28,6 +28,7 @@ class ExternalQuestion:
 
     platform = "external-question"
     parameters: tuple[str, ...] = (ASSIGNMENT, TASK, PERSON, SITE)
+    submission: tuple[str, ...] = (PERSON, ASSIGNMENT)
     has_time_limit = True
 
     def __init__(self, settings: Recruitment) -> None:

@@ -21,6 +21,7 @@ class Prolific:
 
     platform = "prolific"
     parameters: tuple[str, ...] = (PERSON, STUDY, SUBMISSION)
+    submission: tuple[str, ...] = (PERSON, SUBMISSION)
     has_time_limit = True
     embedded_by: tuple[str, ...] = ()
 

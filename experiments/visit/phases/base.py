@@ -199,9 +199,13 @@ class Consent(FormPhase):
 class Comprehension(FormPhase):
     """The comprehension check. A participant who fails too many attempts is screened out.
 
-    Only complete forms count as attempts. Each page contains the number of the attempt, so that a page that is
-    submitted twice counts once.
+    Only complete forms count as attempts. Each page contains the number of the attempt, so that a form that is
+    submitted twice counts once. Other answers on an old page count as an attempt.
     """
+
+    def __init__(self, plan: VisitPlan, name: str, template: str = "form") -> None:
+        super().__init__(plan, name, template)
+        self._counted: dict[str, Answers] = {}  # answers of each participant's last attempt, by path
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:
         """Return additional values for the page's template."""
@@ -216,13 +220,13 @@ class Comprehension(FormPhase):
         read = super().read(visitor, sent)
         if isinstance(read, Again):
             return dataclasses.replace(read, counts=False)
-        again = Again(self.texts["wrong"], {"form": self._form(None, read.answers)})
-        if sent.get("attempt", str(visitor.attempts)) != str(visitor.attempts):
-            return dataclasses.replace(
-                again, counts=False
-            )  # otherwise, an old page would give unlimited attempts
         if not any(item.is_wrong(read.answers.get(item.name)) for item in self.items):
             return read
+        again = Again(self.texts["wrong"], {"form": self._form(None, read.answers)})
+        is_old = sent.get("attempt", str(visitor.attempts)) != str(visitor.attempts)
+        if is_old and self._counted.get(visitor.path, read.answers) == read.answers:
+            return dataclasses.replace(again, counts=False)
+        self._counted[visitor.path] = read.answers
         limit = self._plan.limits.attempts
         last = limit is not None and visitor.attempts + 1 >= limit
         return Done(read.answers, "screened_out") if last else again

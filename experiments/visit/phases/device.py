@@ -38,7 +38,8 @@ class DeviceCheck(FormPhase):
     """A page that tests the participant's computer and submits the results."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:
-        return {"keyboard": self._plan.device.keyboard, "failed": visitor.attempts > 0}
+        needed = self._plan.device
+        return {"keyboard": needed.keyboard, "failed": visitor.attempts > 0, "scene": self._plan.scene}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002
         measured = _measured(sent)

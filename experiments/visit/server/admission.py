@@ -59,7 +59,7 @@ class Admission:
             section=self._plan.texts["welcome"],
             parameters={name: ids.get(name, "") for name in self._recruiter.parameters},
             remembers=platform == "link",
-            picture=self._plan.picture is not None,
+            picture=self._plan.has_picture,
             forgets=platform == "lab",
             device=self._plan.device if DEVICE in self._plan.phases else None,
             **values,

@@ -186,7 +186,7 @@ class VisitServer:
         path, until = self._plan.picture, time.monotonic() + DRAWING_TIMEOUT
         while path is not None and not path.is_file() and time.monotonic() < until:
             await asyncio.sleep(0.2)
-        if path is None or not path.is_file():
+        if path is None or not path.is_file() or not self._plan.has_picture:
             return PlainTextResponse("not found\n", 404)
         return FileResponse(path, headers={"Cache-Control": CHECKED}, media_type="image/webp")
 

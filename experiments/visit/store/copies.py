@@ -75,8 +75,8 @@ async def restore(path: Path, url: str) -> None:
         copy = shutil.copyfile(path, Path(folder, "backup.db"))
         source, target = Database(f"sqlite:///{copy}"), Database(url)
         try:
-            await source.check()
             try:
+                await source.check()
                 await upgrade(source, create=False)
             except StoreError as error:  # the message must not name the temporary copy
                 raise StoreError(str(error).replace(source.name, str(path))) from error

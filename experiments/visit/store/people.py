@@ -5,13 +5,13 @@ from dataclasses import replace
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, bindparam, insert, select, update
+from sqlalchemy import ColumnElement, bindparam, delete, insert, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.errors import StoreError
-from experiments.visit.store.part import StorePart, new_id
+from experiments.visit.store.part import StorePart, new_id, note
+from experiments.visit.store.tables import answer, person
 from experiments.visit.store.tables import identity as ids
-from experiments.visit.store.tables import person
 from experiments.visit.store.values import PersonRow, Status, utc_now
 
 _FIELDS = (
@@ -110,6 +110,24 @@ class People(StorePart):
         query = select(ids.c.ids).where(ids.c.person_id == person_id)
         async with self._database.reading() as connection:
             return dict((await connection.execute(query)).scalar() or {})
+
+    async def set_known(self, known: Mapping[int, bool], who: str) -> None:
+        """Record if the recruitment platform knows each participant, as the answer `known` in `recruitment`."""
+        now = utc_now()
+        given = {"phase": "recruitment", "item": "known", "given": now, "final": True}
+
+        async def work(connection: AsyncConnection) -> None:
+            mine = (
+                answer.c.person_id.in_(known),
+                *(answer.c[name] == given[name] for name in ("phase", "item")),
+            )
+            await connection.execute(delete(answer).where(*mine))
+            for number, value in known.items():
+                await connection.execute(insert(answer), {"person_id": number, "value": value, **given})
+            unknown = [number for number, value in known.items() if not value]
+            await note(connection, self._study_id, who, "participants reconciled", {"unknown": unknown}, now)
+
+        await self._database.write(work)
 
     async def beat(self, person_id: int, now: datetime | None = None) -> None:
         """Record that a participant is active, so that the participant's place is not given away."""

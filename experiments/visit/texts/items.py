@@ -6,7 +6,7 @@ import msgspec
 
 Kind = Literal["scale", "choice", "several", "number", "line", "text"]
 MAX_LINE, MAX_TEXT = 200, 2000  # maximum lengths of answers, in characters
-NAME = r"^[a-z][a-z0-9_]{0,39}$"
+NAME = r"^[a-z][a-z0-9_]{0,39}\Z"
 
 
 class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

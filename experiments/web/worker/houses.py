@@ -64,11 +64,20 @@ def scene_files(house: House) -> tuple[str, str]:
 
 
 def make_files(house: House) -> None:
-    """Create the scene files and the picture on the welcome page, unless they exist."""
+    """Create the scene files and the picture on the welcome page, unless they exist.
+
+    If the picture cannot be drawn, its file is empty, so that the server does not wait for it.
+    """
     scene_files(house)
     path = view_path(house.catalogue, scenes_folder())
-    if not path.is_file():
+    if path.is_file() and path.stat().st_size:
+        return
+    path.unlink(missing_ok=True)
+    try:
         draw_largest_room(house, path)
+    except Exception:  # such as a machine without OpenGL
+        path.touch()
+        raise
 
 
 def preload(name: str) -> None:

@@ -26,6 +26,8 @@ START_CLEARANCE = 0.5  # minimum distance from the person's start position to an
 DROP = (0.01, 0.02)  # range of heights from which objects are dropped, in metres
 MAX_FALL = 0.1  # maximum distance from a surface down to an object that was dropped onto it, in metres
 PACKINGS, DRAWS = 20, 4000  # Incomplete sets of points are discarded to keep the distribution uniform.
+# Maximum ratio of the sizes of two sets of points that cannot be extended: each point blocks at most seven others
+MAX_RATIO = 7
 DROPS = 8
 MAX_POINTS = 1000
 LEAST_VIEW = 0.6  # minimum distance between the start position and a wall ahead, in metres
@@ -147,15 +149,17 @@ def sample_points(
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
     """Draw walkable points (count, 2) that are far from each other and from `keep_away` (k, 2), in metres."""
-    best = 0
+    found: list[int] = []
     for _ in range(PACKINGS):
         points = _pack(navigable, keep_away, count, rng)
         if len(points) == count:
             return points
-        best = max(best, len(points))
+        found.append(len(points))
+        if count > MAX_RATIO * len(points):
+            break
     raise SamplingError(
-        f"only {best} of {count} points fit at least {MIN_DISTANCE} m from each other and from "
-        f"{len(keep_away)} receptacles, after {PACKINGS * DRAWS - best} rejections; "
+        f"only {max(found)} of {count} points fit at least {MIN_DISTANCE} m from each other and from "
+        f"{len(keep_away)} receptacles, after {len(found) * DRAWS - max(found)} rejections; "
         "ask for fewer points (--points) or use a larger house"
     )
 

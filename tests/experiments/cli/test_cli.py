@@ -116,6 +116,12 @@ def test_bad_input_is_named_in_one_line_and_leaves_nothing(arguments, fault, tmp
     assert not (tmp_path / "out").exists()
 
 
+def test_a_film_in_an_unknown_language_is_refused(tmp_path, capsys):
+    film = tmp_path / "film.mp4"
+    assert main(["flythrough", "--language", "xx", "--out", str(film)]) == 2
+    assert "no labels in language 'xx'; write labels.xx.toml" in capsys.readouterr().err and not film.exists()
+
+
 @pytest.mark.parametrize(
     ("words", "fault"),
     [
@@ -311,6 +317,7 @@ numpy.ones(1) / numpy.zeros(1)"""
         (["metrics", ""], "an argument is empty"),
         (["batch", "--out", "x", "--workers", "9" * 14], "is not a number from 0 to 100000"),
         (["replay", "run", "--assistance="], "an argument is empty"),
+        ([*PLAY, "--language", "xx"], "invalid choice: 'xx'"),
         ([*PLAY, "--minimum", "story=1e99"], "1e+99 s is too long; give at most 86400 s"),
     ],
 )

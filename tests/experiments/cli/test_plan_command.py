@@ -105,6 +105,13 @@ def claimed(tmp_path, capsys, problem, *options):
     return claim, json.loads(claim.read_text())
 
 
+def test_a_certificate_does_not_replace_the_problem(tmp_path, capsys):
+    code, printed = plan(
+        tmp_path, capsys, PROBLEM, "--certificate", str(tmp_path / "problem.json"), "--force"
+    )
+    assert code == 2 and "problem.json is the problem" in printed.err
+
+
 def checked(tmp_path, capsys, claim):
     code = main(["plan", str(tmp_path / "problem.json"), "--check", str(claim)])
     return code, capsys.readouterr()

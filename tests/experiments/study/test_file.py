@@ -40,6 +40,9 @@ def test_the_survey_asks_what_the_analysis_reads():
     ("before", "after", "line", "value"),
     [
         ("reward = 7.50", 'reward = "much"', "reward", "study.pay.reward is 'much'"),
+        ("reward = 7.50", "reward = 7.505", None, "reward is 7.505; amounts have at most two decimals"),
+        ('currency = "USD"', 'currency = "USD\\n"', "currency", "study.pay.currency is 'USD\\n'"),
+        ('title = "Tidying up with a helpful display"', 'title = " "', "title", "title is ' '"),
         ("reward = 7.50", "rewards = 7.50", "rewards", "`rewards`"),
         ("story = 20", "story = -1", "story", "minimum.story is -1"),
         ("minutes = 25", "minutes = 0", "minutes", "study.minutes is 0"),

@@ -1,13 +1,16 @@
-"""The file of `mjsim study init` goes through all commands, with no other edit than those that `check` asks for."""
+"""The file of `mjsim study init`, with the phase and the survey of the docs, goes through all commands."""
 
 import asyncio
 import dataclasses
+import re
 import subprocess
 import sys
 from contextlib import AsyncExitStack
+from pathlib import Path
 
 import httpx
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from experiments.cli.main import main
@@ -27,18 +30,31 @@ from experiments.web.server.pool import WorkerPool
 
 PATIENCE = 120.0  # s
 ASKED_FOR = (("your institution", "A university"), ("you@example.org", "people@university.edu"))
+PAGE = (Path(__file__).parents[3] / "docs" / "study-file.md").read_text()
+
+
+def written(language, part):
+    """The code of docs/study-file.md that contains a text."""
+    [code] = [code for code in re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL) if part in code]
+    return code
 
 
 @pytest.fixture
-def study(tmp_path):
-    """The file of `study init` with an institution and an address."""
+def study(tmp_path, monkeypatch):
+    """The file of `study init` with an institution, an address, and what the docs say about own phases and items."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "mood.py").write_text(written("python", "class Mood"))
+    survey = written("toml", "survey.item").partition("[[survey.item]]")
+    (tmp_path / "my_texts.toml").write_text("".join(survey[1:]) + written("toml", '["mood:Mood"]'))
     path = tmp_path / "study.toml"
     assert main(["study", "init", str(path)]) == 0
     text = path.read_text()
     for before, after in ASKED_FOR:
         assert before in text
         text = text.replace(before, after)
-    path.write_text(text)
+    settings = written("toml", 'texts = "my_texts.toml"\nphases')
+    path.write_text(text.replace("[study]\n", f"[study]\n{settings}", 1))
     return path
 
 
@@ -110,6 +126,12 @@ def test_the_file_of_init_goes_through_all_commands(tmp_path, study, capsys):
     assert [(one.outcome, one.faults) for one in gone] == [("finished", [])] * 2
     names = [str(study), str(served)]
     assert main(["study", "collect", *names, "--out", str(table)]) == 0
+    (row, _) = pq.read_table(table / "trials.parquet").to_pylist()
+    assert (
+        row["mood:Mood_calm"] in (1, 2, 3, 4)
+        and row["likert_calm"] in (1, 2, 3, 4, 5)
+        and not row["inattentive"]
+    )
     assert main(["study", "analyze", str(table), "--exclude", str(study)]) == 0, capsys.readouterr().err
     assert main(["study", "export", *names, "--out", str(tmp_path / "export")]) == 0
     assert main(["study", "pay", *names]) == 0

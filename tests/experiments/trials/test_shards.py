@@ -232,6 +232,9 @@ def test_missing_trials_are_named_by_shard(whole, tmp_path, capsys):
     text = " ".join(capsys.readouterr().err.split())
     assert code == 1
     assert "2 of 10 trials are missing: run again --shard 2/5 (1), --shard 5/5 (1), then merge again" in text
+    assert main(["batch", "--out", str(tmp_path / "out"), "--merge"]) == 1
+    text = " ".join(capsys.readouterr().err.split())
+    assert "30 of 30 trials are missing: give --merge the DESIGN.toml or the options" in text
 
 
 def test_a_trial_that_differs_in_two_parts_is_named_and_nothing_is_merged(whole, tmp_path):

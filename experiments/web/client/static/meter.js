@@ -71,12 +71,12 @@ export class Meter {
 }
 
 /**
- * Returns true if a report measured no frames because the picture did not change. The server sends no frames then, so the
- * report says nothing about the display.
- * @param {{ draw: "browser" | "server", frames_per_s: number, dropped: number, latency_ms: number | null }} report
+ * Returns true if a report measured no frame times because the picture did not change. The server sends no frames then,
+ * so the report says nothing about the display.
+ * @param {{ draw: "browser" | "server", frame_ms: number, dropped: number, latency_ms: number | null }} report
  */
-export const isStill = ({ draw, frames_per_s, dropped, latency_ms }) =>
-  draw === "server" && !frames_per_s && !dropped && latency_ms === null;
+export const isStill = ({ draw, frame_ms, dropped, latency_ms }) =>
+  draw === "server" && !frame_ms && !dropped && latency_ms === null;
 
 /** @param {number[]} values @param {number} share */
 const quantile = (values, share) => values.sort((a, b) => a - b)[Math.floor(share * (values.length - 1))];

@@ -11,12 +11,15 @@ import { Meter } from "./meter.js";
 import { Screen, bestCodec } from "./screen.js";
 
 const DEGREE = Math.PI / 180; // rad
-const SLOWEST = 20; // frame rate below which the picture becomes coarser, or the server draws, in fps
+export const SLOWEST = 20; // frame rate below which the picture becomes coarser, or the server draws, in fps
 const JUDGED_AFTER = 2; // duration of measurements that may change how the picture is drawn, in s
-const COARSER = 0.7; // factor of the resolution of a slow picture
+export const COARSER = 0.7; // factor of the resolution of a slow picture
 const COARSEST = 0.5; // lowest resolution before the server draws, as a share of the display's
 const MAX_RATIO = 2; // most drawn pixels per CSS pixel in each direction
 const RESTORED_WITHIN = 5000; // how long a lost context may take to return, in ms
+
+/** Returns the resolution to draw with, as a share of the display's. @param {number} scale that share without `MAX_RATIO` */
+export const resolution = (scale) => scale * Math.min(1, MAX_RATIO / (window.devicePixelRatio || 1));
 
 /**
  * @typedef {object} Events
@@ -106,10 +109,8 @@ export class Picture {
 
   /** Adapts the drawing to the size of the view. */
   resize() {
-    const ratio = window.devicePixelRatio || 1;
-    this.drawn?.world.resize(this.#scale * Math.min(1, MAX_RATIO / ratio));
+    this.drawn?.world.resize(resolution(this.#scale));
   }
-
 
   /** Returns the view to request from the server. @returns {View} */
   get view() {
@@ -171,7 +172,8 @@ export class Picture {
   /** Returns the display quality since the last call or the start of the clock. A browser that is too slow draws less. */
   report() {
     const { seconds, ...seen } = this.meter.take();
-    const slow = seen.frames_per_s < SLOWEST && seconds > JUDGED_AFTER && !document.hidden;
+    if (!this.drawn && seen.frame_ms) seen.frames_per_s = 1000 / seen.frame_ms; // the server sends no unchanged frames
+    const slow = this.drawn && seen.frames_per_s < SLOWEST && seconds > JUDGED_AFTER && !document.hidden;
     const draw = /** @type {"browser" | "server"} */ (this.drawn ? "browser" : "server");
     const { renderer } = this;
     const field = this.#chosen === null ? {} : { field_of_view: this.#chosen };

@@ -44,5 +44,5 @@ test("a picture of the server that does not change is no slow picture", () => {
   expect(isStill({ ...report, draw: "browser" })).toBe(false);
   expect(isStill({ ...report, latency_ms: 40 })).toBe(false);
   expect(isStill({ ...report, dropped: 1 })).toBe(false);
-  expect(isStill({ ...report, frames_per_s: 0.2 })).toBe(false);
+  expect(isStill({ ...report, frame_ms: 40 })).toBe(false);
 });

@@ -1,6 +1,8 @@
 // @vitest-environment happy-dom
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 
+vi.mock("../static/drawing/world.js", async () => import("./fake_world.js"));
+
 describe("study form", () => {
   const sent = vi.fn(async () => new Response(null, { status: 204 }));
   beforeEach(async () => {
@@ -51,6 +53,7 @@ describe("device check", () => {
     vi.stubGlobal("requestAnimationFrame", (/** @type {FrameRequestCallback} */ next) => setTimeout(() => next(performance.now()), 16));
     const names = ["webgl", "renderer", "frames_per_s", "latency_ms", "width", "height", "pixel_ratio", "keyboard"];
     document.body.innerHTML = `<form id="device" data-ping="/ping" data-keyboard="yes"><p id="state" data-running="Checking" data-key="Press W"></p>
+      <canvas id="apartment" data-scene="/scene/1/"></canvas>
       ${["webgl", "frames", "latency", "keyboard", "screen"].map((name) => `<b data-result="${name}"></b>`).join("")}
       ${names.map((name) => `<input type="hidden" name="${name}">`).join("")}
       <button class="button" disabled>Continue</button><button name="give_up" disabled>No</button></form>`;
@@ -73,6 +76,34 @@ describe("device check", () => {
     expect(Number(value("latency_ms"))).toBeLessThan(1000);
     expect(value("width")).toBe(String(window.innerWidth));
     expect(value("webgl")).toBe(""); // the test environment has no WebGL
+  });
+
+  /** Frame rate that is measured if each frame of the apartment takes as long, in ms. @param {number} frame */
+  async function measured(frame) {
+    vi.stubGlobal("fetch", async () => new Response(null, { status: 204 }));
+    let now = 0;
+    vi.stubGlobal("requestAnimationFrame", (/** @type {FrameRequestCallback} */ next) => setTimeout(() => next((now += frame))));
+    const { world } = /** @type {typeof import("./fake_world.js")} */ (/** @type {unknown} */ (await import("../static/drawing/world.js")));
+    vi.clearAllMocks();
+    void import("../static/study/device.js");
+    await vi.waitFor(() => expect(document.body.textContent).toContain("Press W"), 5000);
+    return { rate: Number(value("frames_per_s")), world };
+  }
+
+  test("the frame rate is that of a walk through the rooms of the apartment", async () => {
+    const { rate, world } = await measured(25);
+    expect(rate).toBe(40);
+    expect(await world.load.mock.results[0]?.value).toHaveProperty("file", "/scene/1/scene.json");
+    expect(world.draw).toHaveBeenCalledTimes(61);
+    const places = world.setEye.mock.calls.map(([{ position }]) => position.join(" "));
+    expect(new Set(places)).toEqual(new Set(["1 1 1.6", "5 1 1.6"]));
+    expect(document.getElementById("apartment")).toBeNull();
+  });
+
+  test("a slow picture is drawn with a lower resolution, as in a trial", async () => {
+    const { rate, world } = await measured(100);
+    expect(rate).toBe(10);
+    expect(world.resize.mock.calls).toEqual([[1], [0.7]]);
   });
 
   test("a failed connection is recorded as a very long latency", async () => {

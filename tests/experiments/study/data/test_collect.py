@@ -235,7 +235,12 @@ def test_items_and_scale_of_ones_own_are_analysed_and_preregistered(tmp_path, ow
 
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
-    ("column", "fault"), [("display_frames_per_s", None), ("display_frames", "no column 'display_frames'")]
+    ("column", "fault"),
+    [
+        ("display_frames_per_s", None),
+        ("recruitment_known", None),
+        ("display_frames", "no column 'display_frames'"),
+    ],
 )
 def test_rules_about_displays_spare_simulated_people_and_unknown_columns_are_a_fault(
     tmp_path, own_study, column, fault
@@ -250,4 +255,4 @@ def test_rules_about_displays_spare_simulated_people_and_unknown_columns_are_a_f
         return
     assert faults == []
     notes = json.loads((tmp_path / "analysis" / "stats.json").read_text())["notes"]
-    assert [note for note in notes if "display_frames_per_s < 15.0 is not applied" in note]
+    assert [note for note in notes if f"{column} < 15.0 is not applied" in note]

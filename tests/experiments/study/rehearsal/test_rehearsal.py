@@ -158,9 +158,15 @@ def test_another_study_or_folder_is_not_opened_as_an_empty_study(tmp_path, study
     words = ["serve", str(other), "--out", str(served), "--port", "0", "--no-open", "--film", str(film)]
     assert main(["study", *words]) == 2, "a folder holds one study"
     assert "it has: small" in capsys.readouterr().err
+    assert main(["play", "--port", "0", "--no-open", "--out", str(served)]) == 2
+    assert "it has: small" in capsys.readouterr().err
     assert main(["study", "researcher", "list", str(study), str(tmp_path / "typo")]) == 2
+    assert main(["study", "researcher", "list", str(study), str(served), "ada"]) == 2
+    assert "leave out 'ada'" in capsys.readouterr().err
     (tmp_path / "empty.db").touch()
-    assert main(["study", "restore", str(tmp_path / "empty.db"), str(tmp_path / "new.db")]) == 2
+    for database in (str(tmp_path / "new.db"), "ada:hunter2@host/x"):
+        assert main(["study", "restore", str(tmp_path / "empty.db"), database]) == 2
+    assert "hunter2" not in (told := capsys.readouterr().err) and str(tmp_path / "empty.db") in told
     assert not (tmp_path / "typo").exists() and not (tmp_path / "new.db").exists()
 
 

@@ -31,7 +31,7 @@ reward = 7.50
 bonus_for_all = 1.00
 
 [study.device]
-frames_per_s = 1
+frames_per_s = 0
 latency_ms = 100000
 width = 300
 height = 300

@@ -9,7 +9,7 @@ from scripted_workers import hello
 from study_site import PASSWORD, phase_of, served
 from websockets.sync.client import connect
 
-from tests.experiments.web.browser.test_accessibility import DESK, PHONE, violations
+from tests.experiments.web.browser.test_accessibility import LOOKS, violations
 
 pytestmark = pytest.mark.slow
 BROWSERS = ["chromium", "firefox"] if "MJSIM_ALL_CONDITIONS" in os.environ else ["chromium"]
@@ -54,7 +54,7 @@ def reading(site, link):
         yield socket
 
 
-@pytest.mark.parametrize("look", [DESK, PHONE])
+@pytest.mark.parametrize("look", LOOKS)
 def test_no_page_breaks_a_rule_of_axe_core(site, chromium, look, monkeypatch):
     monkeypatch.setattr("experiments.study.researcher.app.PAGE_SIZE", 1)
     link = consented(site)

@@ -77,6 +77,9 @@ def test_no_page_breaks_a_rule_of_axe_core(served, chromium, look):
     page.get_by_role("checkbox").press("Space")
     send()
     page.get_by_text("Press the W key").wait_for()
+    assert "scene.json" in page.evaluate(
+        "performance.getEntriesByType('resource').map((one) => one.name).join()"
+    )
     found += violations(page)
     page.keyboard.press("w")
     page.locator(".button:focus").wait_for()

@@ -27,12 +27,20 @@ def test_the_object_and_the_bin_of_the_instructions_have_pictures(house):
     assert len(shown.example) == 2 and shown.example.keys() <= shown.pictures.keys()
 
 
+def no_opengl(*_):
+    raise ImportError("no OpenGL")
+
+
 @pytest.mark.slow
 def test_the_picture_of_a_house_is_drawn_once_and_is_no_part_of_its_scene(tmp_path, house, monkeypatch):
     for module in (houses, page):
         monkeypatch.setattr(module, "scenes_folder", lambda: tmp_path)
-    houses.make_files(house)
     path = view_path(house.catalogue, tmp_path)
+    with monkeypatch.context() as blind, pytest.raises(ImportError):
+        blind.setattr(houses, "draw_largest_room", no_opengl)
+        houses.make_files(house)
+    assert path.read_bytes() == b""
+    houses.make_files(house)
     picture, drawn = cv2.imread(str(path)), path.stat().st_mtime_ns
     assert picture.shape == (600, 1200, 3) and picture.std() > 30.0
     houses.make_files(house)

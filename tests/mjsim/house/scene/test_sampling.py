@@ -156,6 +156,8 @@ def test_bad_arguments_are_named(small_catalogue, arguments, message):
 def test_crowded_floor_says_how_much_was_tried(small_catalogue):
     with pytest.raises(SamplingError, match=r"of 40 points .* rejections"):
         sample_episode(small_catalogue, Floor(), objects=6, seed=0)
+    with pytest.raises(SamplingError, match=r"of 400 points .* after [0-3]\d{3} rejections"):  # one packing
+        sample_episode(small_catalogue, Floor(), objects=6, seed=0, points=400)
 
 
 TABLE = '<body name="table{0}" pos="{1} {2} 0.35"><geom type="box" size="0.3 0.3 0.35"/></body>'
