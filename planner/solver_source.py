@@ -148,13 +148,15 @@ class SolverSource(PlanSource):
         self._search = None
 
     def _solve(self, problem: RoutingProblem, *, shown: bool) -> Plan:
-        if shown or self._table is None or self._unseen is None:
+        if self._table is None or self._unseen is None:
             return self._solver.solve(problem, seed=self._seed, limit=self._limit)
-        plan = self._table.plan(problem)
-        if plan is None and self._planned and self._unseen.applies(problem):
+        plan = None if shown else self._table.plan(problem)
+        if plan is not None:
+            return plan
+        if self._planned and self._unseen.applies(problem) and (not shown or self._unseen.by_cuts(problem)):
             return self._unseen.plan(problem, seed=self._seed)
-        if plan is None:
-            plan = self._solver.solve(problem, seed=self._seed, limit=self._limit)
+        plan = self._solver.solve(problem, seed=self._seed, limit=self._limit)
+        if not shown or self._unseen.applies(problem) and self._unseen.by_cuts(problem):
             self._unseen.learn(problem, plan)
         return plan
 

@@ -1,6 +1,5 @@
 """The exact planner for a capacity of one or two and up to 60 objects. OR-Tools solves other problems."""
 
-import math
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -14,7 +13,6 @@ from planner.plan import Plan
 from planner.problem import RoutingProblem, make_plan
 from planner.solvers import Deadline, SolveLimit
 
-TABLE_RATE = 500e6  # approximate speed at which a full table is filled, in bytes per second
 DEFAULT_WORK = 4_000_000  # default number of states to expand, which takes about 4 s including tables
 MAX_OBJECTS = 60
 MAX_ARCS = 40_000  # approximate maximum number of arcs for branch and cut, which may take minutes and 1 GB
@@ -114,12 +112,12 @@ class ExactSolver:
         started = time.perf_counter()
         metric = problem.integers.metric
         instance = make_instance(problem, metric)
-        seconds = math.inf if limit.seconds is None else limit.seconds
         size = full_table_bytes(instance)
-        tabled = size <= min(self.table_bytes, seconds * TABLE_RATE)
+        tabled = size <= self.table_bytes
         n = len(problem.shipments)
-        if tabled and (table_at_once or size <= SMALL_TABLE):
-            found: Iterable[Solution] = [by_table(instance)]
+        at_once = table_at_once and limit.seconds is None
+        if tabled and (at_once or size <= SMALL_TABLE):
+            found: Iterable[Solution] = by_table(instance)
         else:
             start = None if warm is None else warm.numbered(problem.names[:n], instance.unit)
             found = self._search(instance, seed, limit, started, tabled=tabled, start=start)
@@ -140,19 +138,19 @@ class ExactSolver:
         from planner.exact.search import improving_tours  # imported here because it takes 0.5 s to import
 
         deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)
-        work, cut = limit.work or DEFAULT_WORK, not tabled and self._cuts(instance)
+        work, cut = limit.work or DEFAULT_WORK, not tabled and self.uses_cuts(instance)
         passes = () if tabled or cut else self.passes
         for solution in improving_tours(instance, seed, work, deadline, passes, start):
             yield solution
-        if tabled and not deadline.over():
-            yield by_table(instance)
+        if tabled:
+            yield from by_table(instance, deadline)
         elif cut and not deadline.over():
             # Imported here because it loads MathOpt.
             from planner.exact.cuts.branch_and_cut import tours_by_cuts
 
             yield from tours_by_cuts(instance, seed, work, deadline, solution)
 
-    def _cuts(self, instance: Instance) -> bool:
+    def uses_cuts(self, instance: Instance) -> bool:
         """Return True if branch and cut solves an instance. With up to 40 objects, it must be able to prove a tour."""
         n, m = instance.to_bin.shape
         exact = instance.tie == 0 and longest(instance) <= LONGEST

@@ -3,19 +3,28 @@
 import math
 import time
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from planner.exact.instance import Instance, make_instance, to_visits
 from planner.exact.solver import ExactSolver
+from planner.exact.table import Solution
 from planner.exact.warm_start import NOTHING_KNOWN, Start
-from planner.plan import Plan, Status
-from planner.problem import RoutingProblem, make_plan
+from planner.plan import Certificate, Plan, Proof, Status, Visit
+from planner.problem import RoutingProblem, make_plan, possible_next
 from planner.solvers import Deadline, SolveLimit
+
+if TYPE_CHECKING:  # imported only if there are many objects, because this loads MathOpt
+    from planner.exact.cuts.known_cuts import KnownCuts
 
 TASK_WORK = 3_000_000  # default number of states that all searches of a task expand together
 TABLE_OBJECTS = 18  # number of objects from which on a full table replaces the searches
 PAUSE = 2  # number of objects that must be picked up before the next search after one without a proof
 HURRIED_ROWS = 600  # maximum number of rows in a table that is filled after the search was stopped
 SEARCHES = 2  # number of searches per object, one after it is picked up and one after it is placed
+MOVES, TEMPERATURES = 20_000, (0.05, 0.01)  # annealing of an earlier tour with more than 24 objects, in 20 ms
+WIDE = 0.02  # gap between bound and tour, relative to the tour, at which cuts are added
+CUTS_PAUSE = 4  # number of objects that must be picked up before more cuts are added
+CUTS_WORK = 1_000_000  # enough work for a brief search by cuts
 
 
 class TaskSearch:
@@ -26,6 +35,9 @@ class TaskSearch:
     next one. A search without multipliers of an earlier plan may use half of the states, because its
     multipliers serve all later searches. Without states, a plan results from annealing and these multipliers.
     Results are reproducible unless `limit` contains a time or a stop event.
+
+    If there are more than 24 objects, the last tour is annealed, and the cuts of an earlier plan bound it. This takes
+    about 50 ms and is not limited.
 
     Args:
         solver: Exact planner, whose passes are used.
@@ -39,14 +51,31 @@ class TaskSearch:
         self.left = (limit and limit.work) or TASK_WORK
         self._solver = solver
         self._warm = NOTHING_KNOWN
+        self._cuts: KnownCuts | None = None
+        self._refined = math.inf  # number of loose objects when cuts were last added
         self._most = math.inf  # number of loose objects up to which a proof seems possible
 
     def applies(self, problem: RoutingProblem) -> bool:
         return self._solver.applies(problem)
 
     def learn(self, problem: RoutingProblem, plan: Plan) -> None:
-        """Use the multipliers and the order of a plan for this problem in later searches."""
+        """Use the order of a plan for this problem, and its multipliers or cuts, in later searches."""
         self._warm = self._warm.updated(problem, plan)
+        if plan.certificate is not None and plan.certificate.proof is Proof.CUTS:
+            from planner.exact.cuts.known_cuts import KnownCuts
+
+            self._cuts = KnownCuts.of(problem, plan.certificate, self._cuts)
+            self._refined = len(problem.shipments)
+
+    def by_cuts(self, problem: RoutingProblem) -> bool:
+        """Return True if a problem is too large for searches, so that its plans are only bounded by cuts."""
+        return self._solver.uses_cuts(make_instance(problem, problem.integers.metric))
+
+    def least(self, problem: RoutingProblem) -> dict[Visit, int]:
+        """Return a lower bound on the cost of each possible next visit in units, from cuts."""
+        if self._cuts is None:
+            self.plan(problem)
+        return {visit: 0 for visit in possible_next(problem)} if self._cuts is None else self._cuts.least(problem)
 
     def start(self, problem: RoutingProblem, instance: Instance) -> Start | None:
         """Return a warm start for a problem, or None if nothing is known about its objects."""
@@ -65,23 +94,53 @@ class TaskSearch:
 
     def plan(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
         """Return the best plan within the share of this problem, to which the solver must apply."""
-        # Imported here because it takes 0.5 s to import.
-        from planner.exact.search import WARM_ROWS, improving_tours
-
         started, metric = time.perf_counter(), problem.integers.metric
         instance, n = make_instance(problem, metric), len(problem.shipments)
-        stopped = limit is not None and limit.stopped
-        work, rows = (0, HURRIED_ROWS) if stopped else (self.share(problem), WARM_ROWS)
-        start = self.start(problem, instance)
-        *_, best = improving_tours(instance, seed, work, deadline(limit), self._solver.passes, start, rows)
-        self.spend(best.expanded)
+        by_cuts = self._solver.uses_cuts(instance)
+        best = (self._bounded if by_cuts else self._searched)(problem, instance, seed, limit)
         visits = to_visits(instance, best.actions, problem.names[:n], problem.names[n:])
         plan = make_plan(problem, metric, visits, best.bound, started, best.certificate)
-        if work and plan.status is not Status.OPTIMAL:
+        if best.expanded and plan.status is not Status.OPTIMAL:
             self._most = min(self._most, n - PAUSE)
         is_better = plan.status is Status.OPTIMAL or not self._warm.multipliers
-        self.learn(problem, plan if is_better else replace(plan, certificate=None))
+        self.learn(problem, plan if is_better and not by_cuts else replace(plan, certificate=None))
         return plan
+
+    def _searched(
+        self, problem: RoutingProblem, instance: Instance, seed: int, limit: SolveLimit | None
+    ) -> Solution:
+        from planner.exact.search import WARM_ROWS, improving_tours  # imported here because it takes 0.5 s
+
+        stopped = limit is not None and limit.stopped
+        work, rows = (0, HURRIED_ROWS) if stopped else (self.share(problem), WARM_ROWS)
+        start, passes = self.start(problem, instance), self._solver.passes
+        *_, best = improving_tours(instance, seed, work, deadline(limit), passes, start, rows)
+        self.spend(best.expanded)
+        return best
+
+    def _bounded(
+        self, problem: RoutingProblem, instance: Instance, seed: int, limit: SolveLimit | None
+    ) -> Solution:
+        from planner.exact.annealing import anneal_from, completed, tour_actions
+        from planner.exact.cuts.branch_and_cut import tours_by_cuts
+        from planner.exact.cuts.graph import state_graph
+        from planner.exact.cuts.known_cuts import KnownCuts
+
+        n, known = len(problem.shipments), self._cuts
+        order = completed(instance, self._warm.indices(problem.names[:n]))
+        length, order = anneal_from(instance, seed, MOVES, order, *TEMPERATURES)
+        best = Solution(tour_actions(instance, order).tolist(), 0, Certificate(Proof.CUTS, instance.unit, 0))
+        cuts: tuple[Cut, ...] = ()
+        if known is not None:
+            root = known.root(problem, instance, state_graph(instance))
+            cuts = tuple(cut for cut, _ in root.cuts)
+            proof = root.certificate(instance.unit, known.certificate.parts)
+            best = replace(best, bound=min(root.value, int(length)), certificate=proof)
+        if best.bound < (1 - WIDE) * length and n <= self._refined - CUTS_PAUSE:
+            *_, best = best, *tours_by_cuts(instance, seed, CUTS_WORK, deadline(limit), best, cuts)
+            if best.certificate.multipliers:
+                self._cuts, self._refined = KnownCuts.of(problem, best.certificate, known), n
+        return best
 
 
 def deadline(limit: SolveLimit | None) -> Deadline:

@@ -223,7 +223,7 @@ def test_a_stopped_search_adds_no_more_cuts_and_keeps_its_best_tour():
 @pytest.mark.slow
 def test_a_time_limit_interrupts_an_integer_round():
     instance, _ = in_the_given_order(dataclasses.replace(random_problem(1, 60, bins=6), resolution=1e-4))
-    model = FlowModel(state_graph(instance), 1, integer=True)
+    model = FlowModel(state_graph(instance), 1, [], integer=True)
     started = time.perf_counter()
     result = integer_flow(model, 10**6, Deadline(started + 1.0))
     assert time.perf_counter() - started < 3
