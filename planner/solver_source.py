@@ -63,7 +63,8 @@ class SolverSource(PlanSource):
 
     With the exact planner, plans that the participant does not see reuse earlier results. These are the full
     table if it is small enough, or else the multipliers of the lower bound. All searches after the first one
-    share a budget of states. The same sequence of states always gives the same plans.
+    share a budget of states. With more than 24 objects, all plans after the first one reuse its cuts. The same
+    sequence of states always gives the same plans.
 
     If `start` is set, `plan` returns a first plan within about 50 ms and starts a background search for a
     better one, which takes up to 20 s by default. The search reuses the multipliers of earlier bounds and the
@@ -153,10 +154,11 @@ class SolverSource(PlanSource):
         plan = None if shown else self._table.plan(problem)
         if plan is not None:
             return plan
-        if self._planned and self._unseen.applies(problem) and (not shown or self._unseen.by_cuts(problem)):
+        reused = self._unseen.by_cuts(problem) if shown else self._unseen.applies(problem)
+        if self._planned and reused:
             return self._unseen.plan(problem, seed=self._seed)
         plan = self._solver.solve(problem, seed=self._seed, limit=self._limit)
-        if not shown or self._unseen.applies(problem) and self._unseen.by_cuts(problem):
+        if reused or not shown:
             self._unseen.learn(problem, plan)
         return plan
 

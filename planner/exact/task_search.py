@@ -14,16 +14,16 @@ from planner.problem import RoutingProblem, make_plan, possible_next
 from planner.solvers import Deadline, SolveLimit
 
 if TYPE_CHECKING:  # imported only if there are many objects, because this loads MathOpt
+    from planner.exact.cuts.connectivity import Cut
     from planner.exact.cuts.known_cuts import KnownCuts
 
 TASK_WORK = 3_000_000  # default number of states that all searches of a task expand together
 TABLE_OBJECTS = 18  # number of objects from which on a full table replaces the searches
-PAUSE = 2  # number of objects that must be picked up before the next search after one without a proof
+PAUSE = 2  # number of objects that must be picked up before a search after one without a proof, or before more cuts
 HURRIED_ROWS = 600  # maximum number of rows in a table that is filled after the search was stopped
 SEARCHES = 2  # number of searches per object, one after it is picked up and one after it is placed
 MOVES, TEMPERATURES = 20_000, (0.05, 0.01)  # annealing of an earlier tour with more than 24 objects, in 20 ms
 WIDE = 0.02  # gap between bound and tour, relative to the tour, at which cuts are added
-CUTS_PAUSE = 4  # number of objects that must be picked up before more cuts are added
 CUTS_WORK = 1_000_000  # enough work for a brief search by cuts
 
 
@@ -36,8 +36,8 @@ class TaskSearch:
     multipliers serve all later searches. Without states, a plan results from annealing and these multipliers.
     Results are reproducible unless `limit` contains a time or a stop event.
 
-    If there are more than 24 objects, the last tour is annealed, and the cuts of an earlier plan bound it. This takes
-    about 50 ms and is not limited.
+    With more than 24 objects, the last tour is annealed, and the cuts of an earlier plan bound it. This takes 30 ms.
+    If the bound is weak, cuts are added, which takes 0.5 s. `limit.work` does not apply.
 
     Args:
         solver: Exact planner, whose passes are used.
@@ -69,13 +69,16 @@ class TaskSearch:
 
     def by_cuts(self, problem: RoutingProblem) -> bool:
         """Return True if a problem is too large for searches, so that its plans are only bounded by cuts."""
-        return self._solver.uses_cuts(make_instance(problem, problem.integers.metric))
+        applies = self._solver.applies(problem)
+        return applies and self._solver.uses_cuts(make_instance(problem, problem.integers.metric))
 
     def least(self, problem: RoutingProblem) -> dict[Visit, int]:
         """Return a lower bound on the cost of each possible next visit in units, from cuts."""
         if self._cuts is None:
             self.plan(problem)
-        return {visit: 0 for visit in possible_next(problem)} if self._cuts is None else self._cuts.least(problem)
+        if self._cuts is None:  # the search was stopped
+            return dict.fromkeys(possible_next(problem), 0)
+        return self._cuts.least(problem)
 
     def start(self, problem: RoutingProblem, instance: Instance) -> Start | None:
         """Return a warm start for a problem, or None if nothing is known about its objects."""
@@ -136,7 +139,7 @@ class TaskSearch:
             cuts = tuple(cut for cut, _ in root.cuts)
             proof = root.certificate(instance.unit, known.certificate.parts)
             best = replace(best, bound=min(root.value, int(length)), certificate=proof)
-        if best.bound < (1 - WIDE) * length and n <= self._refined - CUTS_PAUSE:
+        if best.bound < (1 - WIDE) * length and n <= self._refined - PAUSE:
             *_, best = best, *tours_by_cuts(instance, seed, CUTS_WORK, deadline(limit), best, cuts)
             if best.certificate.multipliers:
                 self._cuts, self._refined = KnownCuts.of(problem, best.certificate, known), n

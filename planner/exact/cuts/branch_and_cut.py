@@ -26,9 +26,10 @@ from planner.solvers import Deadline
 
 RESTARTS, MOVES, TEMPERATURES = 4, 100_000, (0.3, 0.02)  # annealing before the first round, in about 0.5 s
 REPAIR_MOVES, REPAIR_TEMPERATURES = 20_000, (0.05, 0.01)  # annealing of a flow's joined cycles
-ROUNDS, BRIEF_ROUNDS = 50, 3
+ROUNDS, BRIEF_ROUNDS = 50, 2
 STEP_S = 0.1  # time that a step may take after it can no longer be interrupted, in seconds
-CORE = 1_000  # number of arcs in the first integer round, which finds a short tour within 0.3 s
+# Number of arcs in the first integer round, which often finds a shortest tour within 0.5 s, and in a brief search
+CORE, BRIEF_CORE = 1_000, 600
 NEW_CUTS = 60  # maximum number of cuts that are added in a round
 PATIENCE, PROGRESS = 5, 2e-4  # number of rounds in which the bound must rise by this share of itself
 ROUND_WORK, NODE_WORK = 20_000, 40_000  # work of a round and of a node, in expanded states that take as long
@@ -97,7 +98,10 @@ class _Search:
         yield from self._rounds(ROUNDS)
         more, arcs = self.root is not None, CORE
         while more and self.work >= NODE_WORK and self.deadline.left > STEP_S:
-            found_cycles, all_arcs = self._integer_round(self.work // NODE_WORK, seed, arcs), len(self.graph.tail)
+            found_cycles, all_arcs = (
+                self._integer_round(self.work // NODE_WORK, seed, arcs),
+                len(self.graph.tail),
+            )
             yield
             more, arcs = found_cycles or arcs < all_arcs, all_arcs
 
@@ -105,7 +109,7 @@ class _Search:
         self.known = {(cut.object, cut.inside.tobytes()): cut for cut in known}
         yield from self._rounds(BRIEF_ROUNDS)
         if self.root is not None:
-            self._integer_round(1, seed, CORE)
+            self._integer_round(1, seed, BRIEF_CORE)
             yield
 
     def _rounds(self, rounds: int) -> Iterator[None]:

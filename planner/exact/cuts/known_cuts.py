@@ -26,9 +26,7 @@ class KnownCuts(NamedTuple):
     prices: Mapping[str, float]  # price of each object that was loose in this or an earlier plan, in metres
 
     @classmethod
-    def of(
-        cls, problem: RoutingProblem, certificate: Certificate, before: "KnownCuts | None"
-    ) -> "KnownCuts":
+    def of(cls, problem: RoutingProblem, certificate: Certificate, before: "KnownCuts | None") -> "KnownCuts":
         instance = merged(make_instance(problem, problem.integers.metric))
         home = (*instance.home.tolist(), *instance.carried.tolist())
         metres = np.array(certificate.multipliers) * (certificate.unit / certificate.parts)
@@ -48,7 +46,8 @@ class KnownCuts(NamedTuple):
             inside = np.zeros(count**2 + len(number) * (count + 1) + 1, bool)
             inside[list(members)] = True
             cuts += [
-                (Cut(j, inside[node]), round(multiplier * scale)) for j in np.flatnonzero(objects == k).tolist()
+                (Cut(j, inside[node]), round(multiplier * scale))
+                for j in np.flatnonzero(objects == k).tolist()
             ]
         average = sum(self.prices.values()) / len(self.prices)
         prices = [round(self.prices.get(name, average) * parts / instance.unit) for name in names]
