@@ -64,7 +64,8 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
     for objects, row in result.get("limits", {}).items():
         yield (
             f"limits of 10 ms to 2 s, {objects} objects: {row['solves']} solves; late by "
-            f"{1000 * row['late_median']:.0f} ms (median), {1000 * row['late_p99']:.0f} ms (99 %), {1000 * row['late_max']:.0f} ms (most)"
+            f"{1000 * row['late_median']:.0f} ms (median), {1000 * row['late_p99']:.0f} ms (99 %), "
+            f"{1000 * row['late_max']:.0f} ms (most)"
         )
     if "live" in result:
         yield from _live_lines(result["live"])

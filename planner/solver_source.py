@@ -154,7 +154,7 @@ class SolverSource(PlanSource):
         plan = None if shown else self._table.plan(problem)
         if plan is not None:
             return plan
-        reused = self._unseen.by_cuts(problem) if shown else self._unseen.applies(problem)
+        reused = self._unseen.continues(problem) if shown else self._unseen.applies(problem)
         if self._planned and reused:
             return self._unseen.plan(problem, seed=self._seed)
         plan = self._solver.solve(problem, seed=self._seed, limit=self._limit)

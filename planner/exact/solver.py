@@ -51,12 +51,7 @@ class ExactSolver:
 
         The default limit is 4 million states. If OR-Tools solves the problem, `limit.work` does not apply.
         """
-        limit = limit or SolveLimit()
-        if not self.applies(problem):
-            from planner.ortools_solver import OrToolsSolver  # imported here because it is slow to import
-
-            return OrToolsSolver().solve(problem, limit=replace(limit, work=None))
-        *_, best = self._plans(problem, seed, limit, table_at_once=True)
+        *_, best = self._plans(problem, seed, limit or SolveLimit(), at_once=True)
         return best
 
     def improve(
@@ -72,14 +67,8 @@ class ExactSolver:
         With a warm start, the first plan comes from a narrow search and is usually better. The last plan can
         differ from the result of `solve` if it is not proven optimal or if there are several optimal plans.
         """
-        limit = limit or SolveLimit()
-        if not self.applies(problem):
-            from planner.ortools_solver import OrToolsSolver
-
-            yield from OrToolsSolver().improve(problem, limit=replace(limit, work=None))
-            return
         best = None
-        for plan in self._plans(problem, seed, limit, table_at_once=False, warm=warm):
+        for plan in self._plans(problem, seed, limit or SolveLimit(), at_once=False, warm=warm):
             if best is None or plan.improves_on(best):
                 best = plan
                 yield plan
@@ -106,17 +95,23 @@ class ExactSolver:
         seed: int,
         limit: SolveLimit,
         *,
-        table_at_once: bool,
+        at_once: bool,
         warm: WarmStart | None = None,
     ) -> Iterator[Plan]:
+        """Yield a series of plans. If `at_once`, only the last one counts."""
+        if not self.applies(problem):
+            from planner.ortools_solver import OrToolsSolver  # imported here because it is slow to import
+
+            other, limit = OrToolsSolver(), replace(limit, work=None)
+            yield from [other.solve(problem, limit=limit)] if at_once else other.improve(problem, limit=limit)
+            return
         started = time.perf_counter()
         metric = problem.integers.metric
         instance = make_instance(problem, metric)
         size = full_table_bytes(instance)
         tabled = size <= self.table_bytes
         n = len(problem.shipments)
-        at_once = table_at_once and limit.seconds is None
-        if tabled and (at_once or size <= SMALL_TABLE):
+        if tabled and ((at_once and limit.seconds is None) or size <= SMALL_TABLE):
             found: Iterable[Solution] = by_table(instance)
         else:
             start = None if warm is None else warm.numbered(problem.names[:n], instance.unit)

@@ -72,10 +72,16 @@ class TaskSearch:
         applies = self._solver.applies(problem)
         return applies and self._solver.uses_cuts(make_instance(problem, problem.integers.metric))
 
-    def least(self, problem: RoutingProblem) -> dict[Visit, int]:
+    def continues(self, problem: RoutingProblem) -> bool:
+        """Return True if shown plans reuse earlier results, because the task began with too many objects."""
+        if not self._solver.applies(problem) or self._cuts is None:
+            return self.by_cuts(problem)
+        return not self._solver.table_fits(make_instance(problem, problem.integers.metric))
+
+    def least(self, problem: RoutingProblem, limit: SolveLimit | None = None) -> dict[Visit, int]:
         """Return a lower bound on the cost of each possible next visit in units, from cuts."""
         if self._cuts is None:
-            self.plan(problem)
+            self.plan(problem, limit=limit)
         if self._cuts is None:  # the search was stopped
             return dict.fromkeys(possible_next(problem), 0)
         return self._cuts.least(problem)
