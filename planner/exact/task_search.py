@@ -64,8 +64,9 @@ class TaskSearch:
         if plan.certificate is not None and plan.certificate.proof is Proof.CUTS:
             from planner.exact.cuts.known_cuts import KnownCuts
 
+            if self._cuts is not None:  # another search has added cuts just now
+                self._refined = len(problem.shipments)
             self._cuts = KnownCuts.of(problem, plan.certificate, self._cuts)
-            self._refined = len(problem.shipments)
 
     def by_cuts(self, problem: RoutingProblem) -> bool:
         """Return True if a problem is too large for searches, so that its plans are only bounded by cuts."""
@@ -105,31 +106,29 @@ class TaskSearch:
         """Return the best plan within the share of this problem, to which the solver must apply."""
         started, metric = time.perf_counter(), problem.integers.metric
         instance, n = make_instance(problem, metric), len(problem.shipments)
-        by_cuts = self._solver.uses_cuts(instance)
-        best = (self._bounded if by_cuts else self._searched)(problem, instance, seed, limit)
+        by_cuts, stopped = self._solver.uses_cuts(instance), limit is not None and limit.stopped
+        work = 0 if by_cuts or stopped else self.share(problem)
+        if by_cuts:
+            best = self._bounded(problem, instance, seed, deadline(limit))
+        else:
+            from planner.exact.search import (
+                WARM_ROWS,
+                improving_tours,
+            )  # imported here because it takes 0.5 s
+
+            rows, start = HURRIED_ROWS if stopped else WARM_ROWS, self.start(problem, instance)
+            passes, end = self._solver.passes, deadline(limit)
+            *_, best = improving_tours(instance, seed, work, end, passes, start, rows)
+            self.spend(best.expanded)
         visits = to_visits(instance, best.actions, problem.names[:n], problem.names[n:])
         plan = make_plan(problem, metric, visits, best.bound, started, best.certificate)
-        if best.expanded and plan.status is not Status.OPTIMAL:
+        if work and plan.status is not Status.OPTIMAL:
             self._most = min(self._most, n - PAUSE)
         is_better = plan.status is Status.OPTIMAL or not self._warm.multipliers
         self.learn(problem, plan if is_better and not by_cuts else replace(plan, certificate=None))
         return plan
 
-    def _searched(
-        self, problem: RoutingProblem, instance: Instance, seed: int, limit: SolveLimit | None
-    ) -> Solution:
-        from planner.exact.search import WARM_ROWS, improving_tours  # imported here because it takes 0.5 s
-
-        stopped = limit is not None and limit.stopped
-        work, rows = (0, HURRIED_ROWS) if stopped else (self.share(problem), WARM_ROWS)
-        start, passes = self.start(problem, instance), self._solver.passes
-        *_, best = improving_tours(instance, seed, work, deadline(limit), passes, start, rows)
-        self.spend(best.expanded)
-        return best
-
-    def _bounded(
-        self, problem: RoutingProblem, instance: Instance, seed: int, limit: SolveLimit | None
-    ) -> Solution:
+    def _bounded(self, problem: RoutingProblem, instance: Instance, seed: int, end: Deadline) -> Solution:
         from planner.exact.annealing import anneal_from, completed, tour_actions
         from planner.exact.cuts.branch_and_cut import tours_by_cuts
         from planner.exact.cuts.graph import state_graph
@@ -138,17 +137,18 @@ class TaskSearch:
         n, known = len(problem.shipments), self._cuts
         order = completed(instance, self._warm.indices(problem.names[:n]))
         length, order = anneal_from(instance, seed, MOVES, order, *TEMPERATURES)
-        best = Solution(tour_actions(instance, order).tolist(), 0, Certificate(Proof.CUTS, instance.unit, 0))
+        proof, bound = Certificate(Proof.CUTS, instance.unit, 0, multipliers=(0,) * n), 0
         cuts: tuple[Cut, ...] = ()
         if known is not None:
             root = known.root(problem, instance, state_graph(instance))
             cuts = tuple(cut for cut, _ in root.cuts)
-            proof = root.certificate(instance.unit, known.certificate.parts)
-            best = replace(best, bound=min(root.value, int(length)), certificate=proof)
-        if best.bound < (1 - WIDE) * length and n <= self._refined - PAUSE:
-            *_, best = best, *tours_by_cuts(instance, seed, CUTS_WORK, deadline(limit), best, cuts)
-            if best.certificate.multipliers:
-                self._cuts, self._refined = KnownCuts.of(problem, best.certificate, known), n
+            proof, bound = root.certificate(instance.unit, known.certificate.parts), root.value
+        first = Solution(tour_actions(instance, order).tolist(), min(bound, int(length)), proof)
+        if bound >= (1 - WIDE) * length or n > self._refined - PAUSE:
+            return first
+        *_, best = first, *tours_by_cuts(instance, seed, CUTS_WORK, end, first, cuts)
+        if best.certificate is not proof:
+            self._cuts, self._refined = KnownCuts.of(problem, best.certificate, known), n
         return best
 
 

@@ -26,7 +26,7 @@ from planner.solvers import Deadline
 
 RESTARTS, MOVES, TEMPERATURES = 4, 100_000, (0.3, 0.02)  # annealing before the first round, in about 0.5 s
 REPAIR_MOVES, REPAIR_TEMPERATURES = 20_000, (0.05, 0.01)  # annealing of a flow's joined cycles
-ROUNDS, BRIEF_ROUNDS = 50, 2
+ROUNDS, BRIEF_ROUNDS = 50, 2  # maximum number of linear relaxations, also in a brief search
 STEP_S = 0.1  # time that a step may take after it can no longer be interrupted, in seconds
 # Number of arcs in the first integer round, which often finds a shortest tour within 0.5 s, and in a brief search
 CORE, BRIEF_CORE = 1_000, 600
@@ -47,7 +47,7 @@ def tours_by_cuts(
 ) -> Iterator[Solution]:
     """Yield better tours and bounds than those of a first solution, until a tour is proven or the budget is spent.
 
-    `known` are cuts of an earlier plan. With them, the search is brief: it neither anneals a first tour nor branches.
+    If cuts of an earlier plan are given, the search is brief. It then neither anneals a first tour nor branches.
     """
     search = _Search(instance, work, deadline, first)
     if search.ended:

@@ -91,6 +91,7 @@ def test_integer_rounds_alone_connect_the_flow(monkeypatch):
     monkeypatch.setattr(branch_and_cut, "RESTARTS", 0)
     monkeypatch.setattr(branch_and_cut, "REPAIR_MOVES", 1)
     monkeypatch.setattr(branch_and_cut, "ROUNDS", 1)
+    monkeypatch.setattr(branch_and_cut, "CORE", 120)
     monkeypatch.setattr(branch_and_cut, "joined", lambda _, pieces: np.concatenate(pieces).astype(np.int64))
     branched = []
     for seed in range(12):
@@ -275,6 +276,17 @@ def test_the_bound_of_a_plan_that_is_followed_stays_as_close_as_its_cuts_were(mo
         assert left - gap - 0.02 * plan.cost < later.lower_bound < left + 1e-3
         cuts += len(later.certificate.cuts)
     assert cuts > 0
+
+
+def test_a_stopped_search_without_known_cuts_has_a_certificate_all_the_same():
+    problem, stop = dataclasses.replace(random_problem(3, 9, 1), resolution=1e-4), threading.Event()
+    stop.set()
+    search = TaskSearch(CUTS)
+    plan = search.plan(problem, limit=SolveLimit(stop=stop))
+    check(problem, plan)
+    assert plan.certificate.root == 0
+    assert set(search.least(problem, SolveLimit(stop=stop)).values()) == {0}
+    TaskSearch(CUTS).learn(problem, plan)
 
 
 def test_a_task_without_known_cuts_finds_some():
