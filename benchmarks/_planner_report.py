@@ -9,27 +9,29 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.support.planner_cases import COUNTS
+
 
 def summary(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return a table row for each planner, problem size and task state, including the optimality gaps."""
+    """Return a table row for each planner, problem size and kind, including the optimality gaps."""
     best: dict[tuple[int, int, str], float] = {}
     groups: dict[tuple[int, str, str], list[dict[str, Any]]] = {}
     for r in records:
         if r["cost"] is not None:
-            key = r["objects"], r["seed"], r["state"]
+            key = r["objects"], r["seed"], r["kind"]
             best[key] = min(best.get(key, r["cost"]), r["cost"])
-        groups.setdefault((r["objects"], r["state"], r["planner"]), []).append(r)
-    ranked = sorted(groups.items(), key=lambda item: (item[0][0], item[0][1] != "start"))
+        groups.setdefault((r["objects"], r["kind"], r["planner"]), []).append(r)
+    ranked = sorted(groups.items(), key=lambda item: (item[0][0], list(COUNTS).index(item[0][1])))
     return [
-        {"objects": n, "state": state, "planner": planner, **figures(group, best)}
-        for (n, state, planner), group in ranked
+        {"objects": n, "kind": kind, "planner": planner, **figures(group, best)}
+        for (n, kind, planner), group in ranked
     ]
 
 
 def figures(group: Sequence[dict[str, Any]], best: dict[tuple[int, int, str], float]) -> dict[str, Any]:
-    """Summarize the results of one planner for one problem size and task state. Missing values are None."""
+    """Summarize the results of one planner for one problem size and kind. Missing values are None."""
     solved = [r for r in group if r["cost"] is not None]
-    gaps = [100 * (r["cost"] / best[r["objects"], r["seed"], r["state"]] - 1) for r in solved]
+    gaps = [100 * (r["cost"] / best[r["objects"], r["seed"], r["kind"]] - 1) for r in solved]
     # The gap of a tour of length 0 is 0.
     bounds = [100 * (r["cost"] - r["bound"]) / (r["cost"] or 1.0) for r in solved if r["bound"] is not None]
     cpu, wall = [r["cpu"] for r in group], [r["wall"] for r in group]
@@ -51,23 +53,31 @@ def figures(group: Sequence[dict[str, Any]], best: dict[tuple[int, int, str], fl
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    yield from _table_lines(result)
-    for label in result["not_installed"]:
-        yield f"{label}: not installed (pip install 'mjsim[peers]')"
-    yield (
-        "gap: to the best tour found; best: how often it was; unproven: greatest gap to the planner's own bound; "
-        "MB: most that its process had had by then"
-    )
-    yield from _live_lines(result["live"])
-    for objects, first in result["first_call"].items():
+    if "summary" in result:
+        yield from _table_lines(result)
+        for label in result["not_installed"]:
+            yield f"{label}: not installed (pip install 'mjsim[peers]')"
+        yield (
+            "gap: to the best tour found; best: how often it was; unproven: greatest gap to the planner's own bound; "
+            "MB: most that its process had had by then"
+        )
+    for objects, row in result.get("limits", {}).items():
+        yield (
+            f"limits of 10 ms to 2 s, {objects} objects: {row['solves']} solves; late by "
+            f"{1000 * row['late_median']:.0f} ms (median), {1000 * row['late_p99']:.0f} ms (99 %), "
+            f"{1000 * row['late_max']:.0f} ms (most)"
+        )
+    if "live" in result:
+        yield from _live_lines(result["live"])
+    for objects, first in result.get("first_call", {}).items():
         yield (
             f"first answer in a fresh process, {objects} objects: {first['wall']:.2f} s, CPU {first['cpu']:.2f} s"
         )
 
 
 def _table_lines(result: dict[str, Any]) -> Iterator[str]:
-    table = Table(title=f"{result['houses']} disorganized apartments; gaps in %, times in s")
-    for heading in ("n", "state", "planner"):
+    table = Table(title=f"up to {result['houses']} problems of each kind and size; gaps in %, times in s")
+    for heading in ("n", "kind", "planner"):
         table.add_column(heading, no_wrap=True)
     for heading in (
         "problems",
@@ -86,10 +96,10 @@ def _table_lines(result: dict[str, Any]) -> Iterator[str]:
         table.add_column(heading, justify="right")
     previous = None
     for row in result["summary"]:
-        group = row["objects"], row["state"]
+        group = row["objects"], row["kind"]
         if previous not in (None, group):
             table.add_section()
-        first = ("", "") if group == previous else (str(row["objects"]), row["state"])
+        first = ("", "") if group == previous else (str(row["objects"]), row["kind"])
         previous = group
         table.add_row(*first, row["planner"], *cells(row))
     text = io.StringIO()
@@ -140,7 +150,7 @@ def draw_gaps(axes: Any, rows: Sequence[dict[str, Any]]) -> None:
     """Draw a labelled point per planner, with the exact planner's label below its point to avoid overlaps."""
     shown = max(row["objects"] for row in rows if row["objects"] <= 24)
     for row in rows:
-        if row["objects"] != shown or row["state"] != "start" or row["gap_mean"] is None:
+        if row["objects"] != shown or row["kind"] != "apartment" or row["gap_mean"] is None:
             continue
         few = "" if row["solved"] == row["problems"] else f"\n({row['solved']} of {row['problems']} solved)"
         below = row["planner"] == "exact"
@@ -157,24 +167,22 @@ def draw_gaps(axes: Any, rows: Sequence[dict[str, Any]]) -> None:
         xscale="log",
         xlabel="CPU time, s (median)",
         ylabel="mean gap, %",
-        title=f"{shown} objects, from the start",
+        title=f"{shown} objects in the apartment",
     )
     axes.margins(x=0.4, y=0.2)
 
 
 def draw_proofs(axes: Any, runs: Sequence[dict[str, Any]]) -> None:
-    sizes = sorted({r["objects"] for r in runs})
-    for k, state in enumerate(dict.fromkeys(r["state"] for r in runs)):
-        for x, n in enumerate(sizes):
-            group = [r for r in runs if (r["objects"], r["state"]) == (n, state)]
-            spread = x + np.linspace(-0.12, 0.12, len(group)) + 0.36 * k - 0.18
-            for done, marker in ((True, "o"), (False, "x")):
-                points = [(at, r["cpu"]) for at, r in zip(spread, group, strict=True) if r["proven"] == done]
-                if points:
-                    axes.plot(*np.array(points).T, marker, color=f"C{k}", markersize=4, alpha=0.7)
-        axes.plot([], [], "o", color=f"C{k}", label=state)
+    """Draw a point per problem, in one colour per kind, and a cross for a tour that is not proven."""
+    kinds = list(dict.fromkeys(r["kind"] for r in runs))
+    for k, kind in enumerate(kinds):
+        group = [r for r in runs if r["kind"] == kind]
+        for proven, marker in ((True, "o"), (False, "x")):
+            points = [(r["objects"] + k - len(kinds) / 2, r["cpu"]) for r in group if r["proven"] == proven]
+            axes.plot(*np.array(points).reshape(-1, 2).T, marker, color=f"C{k}", markersize=4, alpha=0.7)
+        axes.plot([], [], "o", color=f"C{k}", label=kind)
     if not all(r["proven"] for r in runs):
         axes.plot([], [], "x", color="grey", label="budget spent, not proven")
     axes.set(yscale="log", xlabel="objects", ylabel="CPU time, s", title="exact: time to proof")
-    axes.set_xticks(range(len(sizes)), [str(n) for n in sizes])
+    axes.set_xticks(sorted({r["objects"] for r in runs}))
     axes.legend(loc="upper left")

@@ -16,12 +16,19 @@ from typing import Any
 
 import numpy as np
 
+from planner.exact.instance import MAX_SEARCHED
+from planner.exact.solver import ExactSolver
 from planner.problem import RoutingProblem
 from planner.solvers import PATIENT_WORK, SolveLimit, solver
 
 # Length of a tour in m or None, lower bound in m or None, and whether the tour is proven to be optimal
 Answer = tuple[float | None, float | None, bool]
 Method = Callable[[RoutingProblem], Answer]
+EXACT = {
+    "exact": ExactSolver(),
+    "search": ExactSolver(table_bytes=0, most_searched=MAX_SEARCHED),
+    "cuts": ExactSolver(table_bytes=0, most_searched=0),
+}
 
 
 def main() -> None:
@@ -29,7 +36,7 @@ def main() -> None:
     name, limit, path = sys.argv[1], float(sys.argv[2]), sys.argv[3]
     solve = method(name, limit)
     problems: list[RoutingProblem] = pickle.loads(Path(path).read_bytes())
-    if name == "exact":
+    if name in EXACT:
         import planner.exact.table_kernels  # noqa: F401 - otherwise small problems are solved without kernels
     solve(problems[0])  # compile the kernels and load the libraries before the measurement
     for problem in problems:
@@ -57,10 +64,8 @@ def method(name: str, limit: float) -> Method:
         return lambda problem: by_pyvrp(problem, limit)
     if name == "vroom":
         return by_vroom
-    planner = solver(name)
-    chosen = (
-        SolveLimit(seconds=limit) if limit else SolveLimit(work=PATIENT_WORK) if name == "exact" else None
-    )
+    planner = EXACT[name] if name in EXACT else solver(name)
+    chosen = SolveLimit(seconds=limit) if limit else SolveLimit(work=PATIENT_WORK) if name in EXACT else None
 
     def by_own(problem: RoutingProblem) -> Answer:
         plan = planner.solve(problem, limit=chosen)

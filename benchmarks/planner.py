@@ -1,7 +1,8 @@
-"""Compare planners in disorganized houses by their optimality gaps, computation times and memory.
+"""Compare planners on 500 problems by their optimality gaps, computation times and memory.
 
-Each planner solves the same problems in its own process, from the start of a task and from the middle. CPU
-time includes only the planner's computation. Gaps are relative to the best tour that any planner found.
+Each planner solves the same problems in its own process. CPU time includes only the planner's computation. Gaps are
+relative to the best tour that any planner found, which `exact` proves to be optimal for almost all problems. The
+planners `search` and `cuts` are the two methods of `exact` for many objects.
 """
 
 import importlib.util
@@ -12,31 +13,29 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
 from benchmarks._command import load
-from experiments.house import House
+from benchmarks.support.planner_cases import COUNTS, Case, make_cases
+from experiments.errors import ConfigError
 from planner.problem import RoutingProblem
-from planner.route import TaskState
-from planner.task_problems import TaskProblems
 
 WORKER = Path(__file__).with_name("_planner_worker.py")
+LIMITS_WORKER = Path(__file__).with_name("_limits_worker.py")
 LIVE_WORKER = Path(__file__).with_name("_live_worker.py")
 REPORT = load(Path(__file__).with_name("_planner_report.py"))
 summary, lines, picture = REPORT.summary, REPORT.lines, REPORT.picture
 LIVE_OBJECTS = 24
 FIRST_OBJECTS = (12, 24)  # problem sizes for which the first call in a new process is timed
-SIZES = (6, 12, 18, 24, 30)
-STATES = ("start", "mid-task")
-OTHERS_SHARE = 5  # only every fifth house is solved by the other planners, because they are slow
-LARGEST_SHARE = 3  # only every third house with 30 objects is used
+OTHERS_SHARE = 5  # only every fifth problem is solved by the other planners, because they are slow
+PARTS = ("instances", "limits", "live", "first")
+LIMITED_SOLVES = 1_000  # number of solves with a time limit
 FIRST_CALL = """
 from pathlib import Path
 import pickle, sys
@@ -53,7 +52,7 @@ class Candidate:
     name: str
     seconds: float = 0.0
     module: str | None = None
-    start_only: bool = False
+    most: int = 60  # maximum number of objects
 
     @property
     def label(self) -> str:
@@ -66,98 +65,70 @@ class Candidate:
 
 CANDIDATES = (
     Candidate("exact"),
+    Candidate("search", most=30),
+    Candidate("cuts"),
     Candidate("ortools", 0.05),
     Candidate("ortools", 0.2),
     Candidate("ortools", 1.0),
     Candidate("ortools", 5.0),
-    Candidate("pyvrp", 1.0, "pyvrp", start_only=True),
-    Candidate("vroom", 0.0, "vroom", start_only=True),
+    Candidate("pyvrp", 1.0, "pyvrp"),
+    Candidate("vroom", 0.0, "vroom"),
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Case:
-    """A routing problem with its number of objects, house seed, and task state."""
-
-    objects: int
-    seed: int
-    state: str
-    problem: RoutingProblem
-
-
-def measure(*, houses: int = 30, quick: bool = False) -> dict[str, Any]:
+def measure(
+    *, houses: int = 30, count: int = LIMITED_SOLVES, parts: Sequence[str] = PARTS, quick: bool = False
+) -> dict[str, Any]:
     """Run the benchmark and return a JSON-serializable result.
 
     Args:
-        houses: Number of houses for each number of objects.
-        quick: True to use only three houses with 6 and 12 objects, and time limits up to 0.2 s.
+        houses: Maximum number of problems of each kind and size.
+        count: Number of solves with a time limit.
+        parts: Parts to run: planners on all problems (instances), time limits (limits), replanning in real time
+            (live) and the first plan of a new process (first).
+        quick: True to use at most three problems with 6 and 12 objects, time limits up to 0.2 s, and 20 solves.
     """
-    sizes = SIZES[:2] if quick else SIZES
-    houses = min(houses, 3) if quick else houses
+    if unknown := sorted(set(parts) - set(PARTS)):
+        raise ConfigError(f"unknown parts {unknown}; choose from {list(PARTS)}")
+    houses, count = (min(houses, 3), min(count, 20)) if quick else (houses, count)
+    sizes = {n for sizes in COUNTS.values() for n in sizes if n <= 12 or not quick}
+    counts = {kind: {n: min(k, houses) for n, k in of.items() if n in sizes} for kind, of in COUNTS.items()}
     candidates = [e for e in CANDIDATES if not quick or e.seconds <= 0.2]
+    result: dict[str, Any] = {"benchmark": "planner", "cores": os.cpu_count(), "houses": houses}
+    if "instances" in parts:
+        result |= instances(candidates, counts)
+    if "limits" in parts:
+        result["limits"] = from_worker(LIMITS_WORKER, count)
+    if "live" in parts:
+        objects, tasks = (max(sizes), 1) if quick else (LIVE_OBJECTS, min(houses, 12))
+        groups = from_worker(LIVE_WORKER, objects, tasks)
+        result["live"] = {"objects": objects, "houses": tasks, "groups": groups}
+    if "first" in parts:
+        cases = make_cases({"apartment": {n: 1 for n in FIRST_OBJECTS if n in sizes}})
+        result["first_call"] = {str(case.objects): first_call(case.problem) for case in cases}
+    return result
+
+
+def instances(candidates: Sequence[Candidate], counts: Mapping[str, Mapping[int, int]]) -> dict[str, Any]:
     with Progress(console=Console(stderr=True), transient=True) as progress:
-        cases = list(make_cases(progress, sizes, houses))
+        bar = progress.add_task("make problems", total=sum(sum(of.values()) for of in counts.values()))
+        cases = []
+        for case in make_cases(counts):
+            cases.append(case)
+            progress.advance(bar)
         records: list[dict[str, Any]] = []
         for candidate in candidates:
             if candidate.installed:
                 records += solve_all(progress, candidate, chosen(candidate, cases))
-    return {
-        "benchmark": "planner",
-        "cores": os.cpu_count(),
-        "houses": houses,
-        "not_installed": [e.label for e in candidates if not e.installed],
-        "first_call": {
-            str(n): first_call(next(c.problem for c in cases if c.objects == n))
-            for n in FIRST_OBJECTS
-            if n in sizes
-        },
-        "live": live(sizes[-1] if quick else LIVE_OBJECTS, min(houses, 1 if quick else 12)),
-        "summary": summary(records),
-        "runs": records,
-    }
-
-
-def make_cases(progress: Progress, sizes: Sequence[int], houses: int) -> Iterator[Case]:
-    """Yield problems in disorganized apartments, at the start and at a random later state of each task."""
-    house = House.load("apartment")
-    problems = TaskProblems(house.geodesics)
-    counts = {n: max(1, houses // LARGEST_SHARE) if n == SIZES[-1] else houses for n in sizes}
-    bar = progress.add_task("disorganize houses", total=sum(counts.values()))
-    for n in sizes:
-        for seed in range(counts[n]):
-            episode = house.sample_episode(objects=n, seed=seed)
-            loose = {o.name: (o.position[0], o.position[1]) for o in episode.objects}
-            approach = {key: r.approach for key, r in house.receptacles.items()}
-            deliveries = {
-                o: (float(approach[r][0]), float(approach[r][1])) for o, r in episode.targets.items()
-            }
-            begin = TaskState((episode.start.x, episode.start.y), loose, (), deliveries)
-            later = mid_task(house, begin, np.random.default_rng([n, seed]))
-            for state, task in zip(STATES, (begin, later), strict=True):
-                yield Case(n, seed, state, problems.problem(task))
-            progress.advance(bar)
-
-
-def mid_task(house: House, begin: TaskState, rng: np.random.Generator) -> TaskState:
-    """Return a random state in which some objects are delivered and up to two are carried."""
-    names = [str(name) for name in rng.permutation(list(begin.loose))]
-    carried = int(rng.integers(0, 3))
-    left = int(rng.integers(1, len(names) - carried + 1))
-    at = house.navmesh.sample(rng)
-    return TaskState(
-        (float(at[0]), float(at[1])),
-        {name: begin.loose[name] for name in names[:left]},
-        tuple(names[left : left + carried]),
-        begin.deliveries,
-    )
+    missing = [e.label for e in candidates if not e.installed]
+    return {"not_installed": missing, "summary": summary(records), "runs": records}
 
 
 def chosen(candidate: Candidate, cases: Sequence[Case]) -> list[Case]:
     if candidate.name == "exact":
         return list(cases)
-    return [
-        c for c in cases if c.seed % OTHERS_SHARE == 0 and (c.state == "start" or not candidate.start_only)
-    ]
+    able = [c for c in cases if c.objects <= candidate.most and not (candidate.module and c.problem.onboard)]
+    return [c for c in able if c.seed % OTHERS_SHARE == 0]
 
 
 def solve_all(progress: Progress, candidate: Candidate, cases: Sequence[Case]) -> list[dict[str, Any]]:
@@ -171,7 +142,7 @@ def solve_all(progress: Progress, candidate: Candidate, cases: Sequence[Case]) -
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as worker:
             for case, line in zip(cases, worker.stdout or (), strict=False):
                 where = {"planner": candidate.label, "objects": case.objects, "seed": case.seed}
-                left = {"state": case.state, "left": len(case.problem.shipments)}
+                left = {"kind": case.kind, "left": len(case.problem.shipments)}
                 records.append(where | left | json.loads(line))
                 progress.advance(bar)
         if worker.returncode:
@@ -193,12 +164,12 @@ def first_call(problem: RoutingProblem) -> dict[str, float]:
     return {"wall": min(wall), "cpu": min(cpu)}
 
 
-def live(objects: int, houses: int) -> dict[str, Any]:
-    """Measure in a worker process how fast the planner replans for a person who ignores the plan."""
-    command = [sys.executable, "-P", str(LIVE_WORKER), str(objects), str(houses)]
+def from_worker(script: Path, *arguments: int) -> dict[str, Any]:
+    """Return the JSON object that a worker process prints."""
+    command = [sys.executable, "-P", str(script), *map(str, arguments)]
     done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
     found: dict[str, Any] = json.loads(done.stdout)
-    return {"objects": objects, "houses": houses, "groups": found}
+    return found
 
 
 def children_cpu() -> float:

@@ -97,14 +97,15 @@ class RegretEvaluator:
         """
         if self._last is None or not same_state(self._last[0], state):
             problem = self._problems.problem(state)
-            costs = self._table.costs(problem)
-            if costs is not None:
-                found = _ranked(problem, *costs)
-            elif self._solver.applies(problem):
-                best = plan if plan is not None and is_for(plan, problem) else None
-                found = _around_best(problem, self._search, self._limit, self._radius, best)
-            else:
-                found = one_by_one(problem, self._solver, limit=self._limit)
+            found = regrets(
+                problem,
+                self._solver,
+                limit=self._limit,
+                radius=self._radius,
+                plan=plan if plan is not None and is_for(plan, problem) else None,
+                table=self._table,
+                search=self._search,
+            )
             self._last = state, {regret.visit: regret for regret in found}
         return dict(self._last[1])
 
@@ -165,15 +166,17 @@ def regrets(
     limit: SolveLimit | None = None,
     radius: float = RADIUS,
     plan: Plan | None = None,
+    table: TaskTable | None = None,
+    search: TaskSearch | None = None,
 ) -> tuple[Regret, ...]:
     """Return the regrets of all possible next visits, starting with the best visit.
 
-    The exact planner evaluates all visits at once. It uses the full table for up to 18 objects, and otherwise
-    one pass over all tours that are at most `radius` longer than the best tour. Regrets above the radius are
-    lower bounds, marked as `capped`. If the pass is too large, the radius is halved, down to 0.1 m. If the
-    pass is still too large or the best tour is not proven optimal, the regrets are estimated with the lower
-    bounds, and are not `proven`. With other planners or capacities, the remaining task is solved separately
-    after each visit.
+    The exact planner evaluates all visits at once. It uses the full table for up to 18 objects, and for up to 24
+    objects one pass over all tours that are at most `radius` longer than the best tour. Regrets above the radius
+    are lower bounds, marked as `capped`. If the pass is too large, the radius is halved, down to 0.1 m. If the
+    pass is still too large, if the best tour is not proven optimal, or with more objects, the regrets are estimated
+    with lower bounds, and are not `proven`. With other planners or capacities, the remaining task is solved
+    separately after each visit.
 
     Args:
         problem: Routing problem of the remaining task.
@@ -181,18 +184,20 @@ def regrets(
         limit: Limit for the search of the exact planner, or for each problem that another planner solves.
         radius: Largest regret that is computed exactly, in metres.
         plan: Plan for this problem, or None to search for one.
+        table: Table of an earlier state of the task, or None.
+        search: Search whose budget is used, or None for a budget of `limit`.
 
     Raises:
         ProblemError: The radius is negative.
     """
     if not radius >= 0:
         raise ProblemError(f"the radius of regrets must be at least 0 m, got {radius}")
-    costs = TaskTable(solver).costs(problem) if isinstance(solver, ExactSolver) else None
+    if not isinstance(solver, ExactSolver) or not solver.applies(problem):
+        return one_by_one(problem, solver, limit=limit)
+    costs = (table or TaskTable(solver)).costs(problem)
     if costs is not None:
         return _ranked(problem, *costs)
-    if isinstance(solver, ExactSolver) and solver.applies(problem):
-        return _around_best(problem, TaskSearch(solver, limit), limit, radius, plan)
-    return one_by_one(problem, solver, limit=limit)
+    return _around_best(problem, search or TaskSearch(solver, limit), limit, radius, plan)
 
 
 def one_by_one(
@@ -239,6 +244,8 @@ def _around_best(
         plan = search.plan(problem, limit=limit)
     else:
         search.learn(problem, plan)
+    if search.by_cuts(problem):
+        return _estimated(plan, search.least(problem, limit), problem.integers.unit)
     metric, unit = problem.integers.metric, problem.integers.unit
     best = int(tour_length(problem, plan.visits, metric))
     is_searched, end = plan.status is Status.OPTIMAL and search.share(problem) > 0, deadline(limit)

@@ -63,7 +63,8 @@ class SolverSource(PlanSource):
 
     With the exact planner, plans that the participant does not see reuse earlier results. These are the full
     table if it is small enough, or else the multipliers of the lower bound. All searches after the first one
-    share a budget of states. The same sequence of states always gives the same plans.
+    share a budget of states. With more than 24 objects, all plans after the first one reuse its cuts. The same
+    sequence of states always gives the same plans.
 
     If `start` is set, `plan` returns a first plan within about 50 ms and starts a background search for a
     better one, which takes up to 20 s by default. The search reuses the multipliers of earlier bounds and the
@@ -148,13 +149,16 @@ class SolverSource(PlanSource):
         self._search = None
 
     def _solve(self, problem: RoutingProblem, *, shown: bool) -> Plan:
-        if shown or self._table is None or self._unseen is None:
+        if self._table is None or self._unseen is None:
             return self._solver.solve(problem, seed=self._seed, limit=self._limit)
-        plan = self._table.plan(problem)
-        if plan is None and self._planned and self._unseen.applies(problem):
+        plan = None if shown else self._table.plan(problem)
+        if plan is not None:
+            return plan
+        reused = self._unseen.continues(problem) if shown else self._unseen.applies(problem)
+        if self._planned and reused:
             return self._unseen.plan(problem, seed=self._seed)
-        if plan is None:
-            plan = self._solver.solve(problem, seed=self._seed, limit=self._limit)
+        plan = self._solver.solve(problem, seed=self._seed, limit=self._limit)
+        if reused or not shown:
             self._unseen.learn(problem, plan)
         return plan
 

@@ -57,9 +57,14 @@ class Deadline:
     at: float | None
     stop: threading.Event | None = None
 
-    def over(self) -> bool:
+    @property
+    def left(self) -> float:
+        """Time until the end in seconds, which is infinite without a time limit."""
         stopped = self.stop is not None and self.stop.is_set()
-        return stopped or (self.at is not None and time.perf_counter() >= self.at)
+        return 0.0 if stopped else math.inf if self.at is None else max(0.0, self.at - time.perf_counter())
+
+    def over(self) -> bool:
+        return self.left == 0.0
 
 
 NEVER = Deadline(None)

@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from mjsim.support.kernels import inlined, kernel
 from planner.exact.instance import Instance
 from planner.exact.table import INFINITE
-from planner.exact.warm_start import Start
 
 HOT, COLD = 0.5, 0.01  # first and last temperature, relative to the mean leg length
 
@@ -219,12 +218,13 @@ def anneal_from(
     return best, best_order
 
 
-def warm_order(instance: Instance, start: Start) -> NDArray[np.int64]:
-    """Return the order of a warm start, with missing objects inserted where they lengthen the tour least."""
+def completed(instance: Instance, order: list[int]) -> NDArray[np.int64]:
+    """Return an order of picks, with missing objects inserted where they lengthen the tour least."""
     n = len(instance.home)
-    order = [*start.order, *start.missing]
+    missing = sorted(set(range(n)) - set(order))
+    order = [*order, *missing]
     costs = np.empty((n + 1, len(instance.bins) + 1), np.int64)
-    for k in start.missing:
+    for k in missing:
         rest = [j for j in order if j != k]
         orders = [[*rest[:t], k, *rest[t:]] for t in range(n)]
         order = min(orders, key=lambda each: decode(instance, np.array(each, dtype=np.int64), 0, costs))

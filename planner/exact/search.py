@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.exact.annealing import anneal, anneal_from, tour_actions, warm_order
+from planner.exact.annealing import anneal, anneal_from, completed, tour_actions
 from planner.exact.expand import PLACE_BITS, expand, offer_roots
 from planner.exact.instance import MAX_SEARCHED, Instance
 from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown, warm_bound
@@ -66,7 +66,7 @@ def _first_tour(
         bound = first_bound(instance, int(length))
     else:
         length, order = anneal_from(
-            instance, seed, WARM_MOVES, warm_order(instance, start), *WARM_TEMPERATURES
+            instance, seed, WARM_MOVES, completed(instance, start.order), *WARM_TEMPERATURES
         )
         bound = warm_bound(instance, start, warm_rows)
     upper, lower, expanded = int(length), bound.root, 0

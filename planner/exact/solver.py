@@ -1,6 +1,5 @@
 """The exact planner for a capacity of one or two and up to 60 objects. OR-Tools solves other problems."""
 
-import math
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -14,7 +13,6 @@ from planner.plan import Plan
 from planner.problem import RoutingProblem, make_plan
 from planner.solvers import Deadline, SolveLimit
 
-TABLE_RATE = 500e6  # approximate speed at which a full table is filled, in bytes per second
 DEFAULT_WORK = 4_000_000  # default number of states to expand, which takes about 4 s including tables
 MAX_OBJECTS = 60
 MAX_ARCS = 40_000  # approximate maximum number of arcs for branch and cut, which may take minutes and 1 GB
@@ -53,12 +51,7 @@ class ExactSolver:
 
         The default limit is 4 million states. If OR-Tools solves the problem, `limit.work` does not apply.
         """
-        limit = limit or SolveLimit()
-        if not self.applies(problem):
-            from planner.ortools_solver import OrToolsSolver  # imported here because it is slow to import
-
-            return OrToolsSolver().solve(problem, limit=replace(limit, work=None))
-        *_, best = self._plans(problem, seed, limit, table_at_once=True)
+        *_, best = self._plans(problem, seed, limit or SolveLimit(), at_once=True)
         return best
 
     def improve(
@@ -74,14 +67,8 @@ class ExactSolver:
         With a warm start, the first plan comes from a narrow search and is usually better. The last plan can
         differ from the result of `solve` if it is not proven optimal or if there are several optimal plans.
         """
-        limit = limit or SolveLimit()
-        if not self.applies(problem):
-            from planner.ortools_solver import OrToolsSolver
-
-            yield from OrToolsSolver().improve(problem, limit=replace(limit, work=None))
-            return
         best = None
-        for plan in self._plans(problem, seed, limit, table_at_once=False, warm=warm):
+        for plan in self._plans(problem, seed, limit or SolveLimit(), at_once=False, warm=warm):
             if best is None or plan.improves_on(best):
                 best = plan
                 yield plan
@@ -108,18 +95,24 @@ class ExactSolver:
         seed: int,
         limit: SolveLimit,
         *,
-        table_at_once: bool,
+        at_once: bool,
         warm: WarmStart | None = None,
     ) -> Iterator[Plan]:
+        """Yield a series of plans. If `at_once`, only the last one counts."""
+        if not self.applies(problem):
+            from planner.ortools_solver import OrToolsSolver  # imported here because it is slow to import
+
+            other, limit = OrToolsSolver(), replace(limit, work=None)
+            yield from [other.solve(problem, limit=limit)] if at_once else other.improve(problem, limit=limit)
+            return
         started = time.perf_counter()
         metric = problem.integers.metric
         instance = make_instance(problem, metric)
-        seconds = math.inf if limit.seconds is None else limit.seconds
         size = full_table_bytes(instance)
-        tabled = size <= min(self.table_bytes, seconds * TABLE_RATE)
+        tabled = size <= self.table_bytes
         n = len(problem.shipments)
-        if tabled and (table_at_once or size <= SMALL_TABLE):
-            found: Iterable[Solution] = [by_table(instance)]
+        if tabled and ((at_once and limit.seconds is None) or size <= SMALL_TABLE):
+            found: Iterable[Solution] = by_table(instance)
         else:
             start = None if warm is None else warm.numbered(problem.names[:n], instance.unit)
             found = self._search(instance, seed, limit, started, tabled=tabled, start=start)
@@ -140,19 +133,19 @@ class ExactSolver:
         from planner.exact.search import improving_tours  # imported here because it takes 0.5 s to import
 
         deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)
-        work, cut = limit.work or DEFAULT_WORK, not tabled and self._cuts(instance)
+        work, cut = limit.work or DEFAULT_WORK, not tabled and self.uses_cuts(instance)
         passes = () if tabled or cut else self.passes
         for solution in improving_tours(instance, seed, work, deadline, passes, start):
             yield solution
-        if tabled and not deadline.over():
-            yield by_table(instance)
+        if tabled:
+            yield from by_table(instance, deadline)
         elif cut and not deadline.over():
             # Imported here because it loads MathOpt.
             from planner.exact.cuts.branch_and_cut import tours_by_cuts
 
             yield from tours_by_cuts(instance, seed, work, deadline, solution)
 
-    def _cuts(self, instance: Instance) -> bool:
+    def uses_cuts(self, instance: Instance) -> bool:
         """Return True if branch and cut solves an instance. With up to 40 objects, it must be able to prove a tour."""
         n, m = instance.to_bin.shape
         exact = instance.tie == 0 and longest(instance) <= LONGEST

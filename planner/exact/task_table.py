@@ -6,7 +6,7 @@ objects. It is filled as soon as at most 18 objects remain.
 
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +81,7 @@ class TaskTable:
         if not self.fits(problem):
             return None
         instance = _instance(problem)
-        self._filled = _Filled(problem, instance, filled_table(instance))
+        self._filled = _Filled(problem, instance, cast(CostTable, filled_table(instance)))
         return _state(self._filled, problem)
 
 

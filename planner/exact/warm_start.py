@@ -21,7 +21,6 @@ class Start(NamedTuple):
     group: NDArray[np.int64]  # group of each object, numbered from 0, shape (n,)
     multipliers: NDArray[np.int64]  # price of picking up each object in units, shape (n,)
     order: list[int]  # indices of known objects, in the order in which a good tour picks them up
-    missing: list[int]  # indices of the objects that are not in `order`
 
 
 @dataclass(frozen=True)
@@ -57,13 +56,16 @@ class WarmStart:
         group = np.zeros(len(names), np.int64)
         for g, members in enumerate(self.groups):
             group[[number[name] for name in members if name in number]] = g
-        order = [number[name] for name in self.order if name in number]
         return Start(
             np.unique(group, return_inverse=True)[1],
             np.array([prices.get(name, average) for name in names], np.int64),
-            order,
-            sorted(set(range(len(names))) - set(order)),
+            self.indices(names),
         )
+
+    def indices(self, names: Sequence[str]) -> list[int]:
+        """Return the indices of known objects among the names, in the order in which a good tour picks them up."""
+        number = {name: k for k, name in enumerate(names)}
+        return [number[name] for name in self.order if name in number]
 
 
 NOTHING_KNOWN = WarmStart({})

@@ -6,12 +6,13 @@ is optimal. Otherwise, cuts that its cycles violate are added, and the smaller p
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
+from ortools.math_opt.python import mathopt
 
 from planner.exact.annealing import anneal_from, decode, tour_actions
 from planner.exact.cuts.connectivity import Cut, violated
@@ -21,26 +22,37 @@ from planner.exact.cuts.root_bound import RootBound, root_bound
 from planner.exact.cuts.tours import joined, walks
 from planner.exact.instance import Instance
 from planner.exact.table import INFINITE, Solution
-from planner.plan import Certificate, Proof
 from planner.solvers import Deadline
 
 RESTARTS, MOVES, TEMPERATURES = 4, 100_000, (0.3, 0.02)  # annealing before the first round, in about 0.5 s
 REPAIR_MOVES, REPAIR_TEMPERATURES = 20_000, (0.05, 0.01)  # annealing of a flow's joined cycles
-ROUNDS = 50
+ROUNDS, BRIEF_ROUNDS = 50, 2  # maximum number of linear relaxations, also in a brief search
+STEP_S = 0.1  # time that a step may take after it can no longer be interrupted, in seconds
+# Number of arcs in the first integer round, which often finds a shortest tour within 0.5 s, and in a brief search
+CORE, BRIEF_CORE = 1_000, 600
 NEW_CUTS = 60  # maximum number of cuts that are added in a round
 PATIENCE, PROGRESS = 5, 2e-4  # number of rounds in which the bound must rise by this share of itself
 ROUND_WORK, NODE_WORK = 20_000, 40_000  # work of a round and of a node, in expanded states that take as long
+INFEASIBLE = (mathopt.TerminationReason.INFEASIBLE, mathopt.TerminationReason.INFEASIBLE_OR_UNBOUNDED)
 PARTS = 1024  # parts of a unit in which multipliers are rounded
 
 
 def tours_by_cuts(
-    instance: Instance, seed: int, work: int, deadline: Deadline, first: Solution
+    instance: Instance,
+    seed: int,
+    work: int,
+    deadline: Deadline,
+    first: Solution,
+    known: Sequence[Cut] | None = None,
 ) -> Iterator[Solution]:
-    """Yield better tours and bounds than those of a first solution, until a tour is proven or the budget is spent."""
+    """Yield better tours and bounds than those of a first solution, until a tour is proven or the budget is spent.
+
+    If cuts of an earlier plan are given, the search is brief. It then neither anneals a first tour nor branches.
+    """
     search = _Search(instance, work, deadline, first)
     if search.ended:
         return
-    for _ in search.steps(seed):
+    for _ in search.steps(seed) if known is None else search.brief_steps(seed, known):
         yield search.solution
         if search.ended:
             return
@@ -67,16 +79,7 @@ class _Search:
     def solution(self) -> Solution:
         certificate, root = self.first.certificate, self.root
         if root is not None and self.lower > self.first.bound:
-            cuts = tuple((cut.object, m, tuple(np.flatnonzero(cut.inside).tolist())) for cut, m in root.cuts)
-            certificate = Certificate(
-                Proof.CUTS,
-                self.instance.unit,
-                root.value,
-                multipliers=tuple(root.prices.tolist()),
-                cuts=cuts,
-                parts=self.parts,
-                branched=self.nodes,
-            )
+            certificate = root.certificate(self.instance.unit, self.parts, self.nodes)
         return Solution(self.actions, min(self.lower, self.upper), certificate)
 
     @property
@@ -87,21 +90,34 @@ class _Search:
         """Run the search, and pause after each step that may have improved the tour or the bound."""
         n = len(self.instance.home)
         for k in range(min(RESTARTS, self.work // MOVES)):
+            if self.deadline.left < 2 * STEP_S:
+                break
             self.work -= MOVES
             self._anneal(seed + k, MOVES, np.arange(n), TEMPERATURES)
             yield
-        yield from self._rounds()
-        more = self.root is not None
-        while more and self.work >= NODE_WORK:
-            more = self._integer_round(self.work // NODE_WORK, seed)
+        yield from self._rounds(ROUNDS)
+        more, arcs = self.root is not None, CORE
+        while more and self.work >= NODE_WORK and self.deadline.left > STEP_S:
+            found_cycles, all_arcs = (
+                self._integer_round(self.work // NODE_WORK, seed, arcs),
+                len(self.graph.tail),
+            )
+            yield
+            more, arcs = found_cycles or arcs < all_arcs, all_arcs
+
+    def brief_steps(self, seed: int, known: Sequence[Cut]) -> Iterator[None]:
+        self.known = {(cut.object, cut.inside.tobytes()): cut for cut in known}
+        yield from self._rounds(BRIEF_ROUNDS)
+        if self.root is not None:
+            self._integer_round(1, seed, BRIEF_CORE)
             yield
 
-    def _rounds(self) -> Iterator[None]:
+    def _rounds(self, rounds: int) -> Iterator[None]:
         """Solve linear relaxations, and add the cuts that their flows violate."""
-        model = FlowModel(self.graph, self.step, integer=False)
+        model = FlowModel(self.graph, self.step, list(self.known.values()), integer=False)
         solver, bounds = FractionalSolver(model), [-math.inf] * PATIENCE
-        for _ in range(min(ROUNDS, self.work // ROUND_WORK)):
-            result = solver.solve(self.deadline)
+        for _ in range(min(rounds, self.work // ROUND_WORK)):
+            result = solver.solve(self.deadline) if self.deadline.left > STEP_S else None
             if result is None:
                 return
             self.work -= ROUND_WORK
@@ -122,21 +138,28 @@ class _Search:
         if self.root is None or root.value >= self.root.value:
             self.root, self.lower = root, max(self.lower, root.value)
 
-    def _integer_round(self, nodes: int, seed: int) -> bool:
-        """Search for a shortest flow on the arcs of tours that may be better. Return True if it is not a tour."""
-        root = cast(RootBound, self.root)
-        graph = self.graph.only(root.least <= self.upper * self.parts)
-        model = FlowModel(graph, self.step, integer=True)
-        for cut in self.known.values():
-            model.add(cut)
+    def _integer_round(self, nodes: int, seed: int, most_arcs: int) -> bool:
+        """Search for a shortest flow on the arcs of tours that may be better. Return True if it is not a tour.
+
+        Only the `most_arcs` arcs of the shortest tours are used. The bound then is at most the length of other tours.
+        """
+        least = cast(RootBound, self.root).least
+        limit = self.upper * self.parts
+        if len(least) > most_arcs:
+            limit = min(limit, int(np.partition(least, most_arcs)[most_arcs]) - 1)
+        graph = self.graph.only(least <= limit)
+        model = FlowModel(graph, self.step, list(self.known.values()), integer=True)
         result = integer_flow(model, nodes, self.deadline)
         if result is None:
             return False
+        other = min(self.upper, limit // self.parts + 1)  # length of a shortest tour with other arcs
         self.nodes += max(1, result.solve_stats.node_count)
         self.work -= max(1, result.solve_stats.node_count) * NODE_WORK
         bound = result.termination.objective_bounds.dual_bound
-        if math.isfinite(bound):  # the error of a bound from floats is far below half a step
-            self.lower = max(self.lower, min(self.upper, math.ceil(bound - 0.5) * self.step))
+        if result.termination.reason in INFEASIBLE:
+            self.lower = max(self.lower, other)
+        elif math.isfinite(bound):  # the error of a bound from floats is far below half a step
+            self.lower = max(self.lower, min(other, math.ceil(bound - 0.5) * self.step))
         if not result.has_primal_feasible_solution():
             return False
         flow = np.rint(model.values(result))

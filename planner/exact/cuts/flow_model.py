@@ -1,8 +1,7 @@
 """Models of shortest flows for MathOpt. GLOP finds fractional flows, and HiGHS finds integer flows."""
 
 import math
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import timedelta
 from functools import partial
 
@@ -15,25 +14,30 @@ from planner.exact.cuts.connectivity import Cut
 from planner.exact.cuts.graph import StateGraph
 from planner.solvers import Deadline
 
+MARGIN = (
+    0.05  # how long before a deadline solvers stop, because they check the time only now and then, in seconds
+)
 GAP = 0.4  # difference between length and bound at which HiGHS stops, because lengths are whole numbers
 
 
 class FlowModel:
-    """Unit flows from the root to the end that enter the nodes of each object once and satisfy the added cuts.
+    """Unit flows from the root to the end that enter the nodes of each object once and satisfy all cuts.
 
     `step` is the number of units by which lengths are counted. Lengths are rounded down to a multiple of it.
     """
 
-    def __init__(self, graph: StateGraph, step: int, *, integer: bool) -> None:
+    def __init__(self, graph: StateGraph, step: int, cuts: Sequence[Cut], *, integer: bool) -> None:
         arcs, nodes = np.arange(len(graph.tail)), np.unique([graph.tail, graph.head])
         surplus = (nodes == graph.end).astype(float) - (nodes == graph.root)
         bounds = np.concatenate([np.ones(graph.objects), surplus])
         picking = graph.picks >= 0
-        rows = np.concatenate(
-            [graph.picks[picking], *np.searchsorted(nodes, [graph.head, graph.tail]) + graph.objects]
-        )
-        columns = np.concatenate([arcs[picking], arcs, arcs])
+        weights = np.array([cut.coefficients(graph) for cut in cuts]).reshape(len(cuts), len(arcs))
+        cut_rows, cut_arcs = np.nonzero(weights)
+        ends = np.searchsorted(nodes, [graph.head, graph.tail]) + graph.objects
+        rows = np.concatenate([graph.picks[picking], *ends, cut_rows + len(bounds)])
+        columns = np.concatenate([arcs[picking], arcs, arcs, cut_arcs])
         values = np.repeat([1.0, 1.0, -1.0], [picking.sum(), len(arcs), len(arcs)])
+        values = np.append(values, weights[cut_rows, cut_arcs])
         order = np.lexsort((columns, rows))
         proto = model_pb2.ModelProto()
         proto.variables.ids.extend(arcs.tolist())
@@ -44,17 +48,17 @@ class FlowModel:
         proto.variables.integers.extend([integer] * len(arcs))
         proto.objective.linear_coefficients.ids.extend(arcs.tolist())
         proto.objective.linear_coefficients.values.extend((graph.length // step).tolist())
-        proto.linear_constraints.ids.extend(range(len(bounds)))
-        proto.linear_constraints.lower_bounds.extend(bounds.tolist())
-        proto.linear_constraints.upper_bounds.extend(bounds.tolist())
+        proto.linear_constraints.ids.extend(range(len(bounds) + len(cuts)))
+        proto.linear_constraints.lower_bounds.extend([*bounds.tolist(), *[0.0] * len(cuts)])
+        proto.linear_constraints.upper_bounds.extend([*bounds.tolist(), *[math.inf] * len(cuts)])
         proto.linear_constraint_matrix.row_ids.extend(rows[order].tolist())
         proto.linear_constraint_matrix.column_ids.extend(columns[order].tolist())
         proto.linear_constraint_matrix.coefficients.extend(values[order].tolist())
         self.graph = graph
         self.model = mathopt.Model.from_model_proto(proto)
         self.flow = list(self.model.variables())
-        self.cover = list(self.model.linear_constraints())[: graph.objects]
-        self.cuts: list[mathopt.LinearConstraint] = []
+        constraints = list(self.model.linear_constraints())
+        self.cover, self.cuts = constraints[: graph.objects], constraints[len(bounds) :]
 
     def add(self, cut: Cut) -> None:
         row, weights = self.model.add_linear_constraint(lb=0.0), cut.coefficients(self.graph)
@@ -101,8 +105,8 @@ def integer_flow(model: FlowModel, nodes: int, deadline: Deadline) -> mathopt.So
 def _solved(
     solve: Callable[..., mathopt.SolveResult], parameters: mathopt.SolveParameters, deadline: Deadline
 ) -> mathopt.SolveResult | None:
-    if deadline.at is not None:
-        parameters.time_limit = timedelta(seconds=max(0.0, deadline.at - time.perf_counter()))
+    if (left := deadline.left) < math.inf:
+        parameters.time_limit = timedelta(seconds=max(0.0, left - MARGIN))
     try:
         return solve(params=parameters)
     except (AttributeError, RuntimeError, ValueError):

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from planner.exact.cuts.connectivity import Cut
 from planner.exact.cuts.graph import StateGraph
+from planner.plan import Certificate, Proof
 
 
 class RootBound(NamedTuple):
@@ -17,6 +18,13 @@ class RootBound(NamedTuple):
     prices: NDArray[np.int64]  # multiplier of each object in parts, shape (n,)
     cuts: tuple[tuple[Cut, int], ...]  # each cut that contributes to the bound, with its multiplier in parts
     least: NDArray[np.int64]  # lower bound in parts on tours that use each arc, shape (arcs,)
+
+    def certificate(self, unit: float, parts: int, branched: int = 0) -> Certificate:
+        cuts = tuple((cut.object, m, tuple(np.flatnonzero(cut.inside).tolist())) for cut, m in self.cuts)
+        prices = tuple(self.prices.tolist())
+        return Certificate(
+            Proof.CUTS, unit, self.value, multipliers=prices, cuts=cuts, parts=parts, branched=branched
+        )
 
 
 def root_bound(

@@ -12,11 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ortools.math_opt.python import mathopt
-from planning_cases import expected, grid_problem, random_problem
+from planning_cases import Task, expected, grid_problem, random_problem, two_rooms
 
 from planner.checker import check, verify_optimal
 from planner.cuts_checker import cuts_bound
 from planner.errors import ProblemError
+from planner.exact import task_search
 from planner.exact.cuts import branch_and_cut
 from planner.exact.cuts.branch_and_cut import tours_by_cuts
 from planner.exact.cuts.flow_model import FlowModel, integer_flow
@@ -24,10 +25,15 @@ from planner.exact.cuts.graph import state_graph
 from planner.exact.instance import make_instance, to_visits
 from planner.exact.solver import ExactSolver
 from planner.exact.table import Solution
-from planner.plan import Certificate, Plan, Proof, Status
-from planner.problem import make_plan, tour_length
+from planner.exact.task_search import TaskSearch
+from planner.plan import Certificate, Plan, Proof, Status, VisitKind
+from planner.problem import make_plan, possible_next, tour_length
 from planner.problem_json import claim_from_json, claim_to_json
+from planner.regret import regrets
+from planner.solver_source import SolverSource
 from planner.solvers import NEVER, Deadline, SolveLimit, solver
+from planner.task_problems import TaskProblems
+from planner.tour_bounds import after
 
 CUTS = ExactSolver(table_bytes=0, most_searched=0)
 WORK = 60_000_000
@@ -85,6 +91,7 @@ def test_integer_rounds_alone_connect_the_flow(monkeypatch):
     monkeypatch.setattr(branch_and_cut, "RESTARTS", 0)
     monkeypatch.setattr(branch_and_cut, "REPAIR_MOVES", 1)
     monkeypatch.setattr(branch_and_cut, "ROUNDS", 1)
+    monkeypatch.setattr(branch_and_cut, "CORE", 120)
     monkeypatch.setattr(branch_and_cut, "joined", lambda _, pieces: np.concatenate(pieces).astype(np.int64))
     branched = []
     for seed in range(12):
@@ -223,11 +230,87 @@ def test_a_stopped_search_adds_no_more_cuts_and_keeps_its_best_tour():
 @pytest.mark.slow
 def test_a_time_limit_interrupts_an_integer_round():
     instance, _ = in_the_given_order(dataclasses.replace(random_problem(1, 60, bins=6), resolution=1e-4))
-    model = FlowModel(state_graph(instance), 1, integer=True)
+    model = FlowModel(state_graph(instance), 1, [], integer=True)
     started = time.perf_counter()
     result = integer_flow(model, 10**6, Deadline(started + 1.0))
     assert time.perf_counter() - started < 3
     assert result.termination.limit is mathopt.Limit.TIME
+
+
+def random_walk(problem, seed):
+    """Yield the problems after each of a series of random visits, as long as two objects are loose."""
+    rng = np.random.default_rng(seed)
+    while len(problem.shipments) > 2:
+        options = list(possible_next(problem))
+        problem = after(problem, options[rng.integers(len(options))])
+        yield problem
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_cuts_of_a_plan_bound_the_tours_and_the_next_visits_of_all_later_states(seed):
+    problem = dataclasses.replace(random_problem(seed, 9, seed % 3), resolution=1e-4)
+    search = TaskSearch(CUTS)
+    search.learn(problem, CUTS.solve(problem))
+    for later in random_walk(problem, seed):
+        plan, exact = search.plan(later), {r.visit: r.cost for r in regrets(later, ExactSolver())}
+        check(later, plan)
+        shortest = min(exact.values())
+        assert plan.lower_bound - 2e-3 <= shortest <= plan.cost + 2e-3
+        least, unit = search.least(later), later.integers.unit
+        assert least.keys() == exact.keys()
+        assert all(least[visit] * unit <= exact[visit] + 2e-3 for visit in exact)
+
+
+def test_the_bound_of_a_plan_that_is_followed_stays_as_close_as_its_cuts_were(monkeypatch):
+    monkeypatch.setattr(task_search, "WIDE", 1.0)  # no cuts are added
+    problem = dataclasses.replace(random_problem(2, 13, 1), resolution=1e-4)
+    plan, search = CUTS.solve(problem), TaskSearch(CUTS)
+    search.learn(problem, plan)
+    gap = plan.cost - plan.certificate.root * plan.certificate.unit
+    left, cuts = plan.cost, 0
+    for visit in plan.visits[:-6]:
+        left -= problem.distances[problem.start, problem.location(visit)]
+        problem = after(problem, visit)
+        later = search.plan(problem)
+        assert left - gap - 0.02 * plan.cost < later.lower_bound < left + 1e-3
+        cuts += len(later.certificate.cuts)
+    assert cuts > 0
+
+
+def test_a_stopped_search_without_known_cuts_has_a_certificate_all_the_same():
+    problem, stop = dataclasses.replace(random_problem(3, 9, 1), resolution=1e-4), threading.Event()
+    stop.set()
+    search = TaskSearch(CUTS)
+    plan = search.plan(problem, limit=SolveLimit(stop=stop))
+    check(problem, plan)
+    assert plan.certificate.root == 0
+    assert set(search.least(problem, SolveLimit(stop=stop)).values()) == {0}
+    TaskSearch(CUTS).learn(problem, plan)
+
+
+def test_a_task_without_known_cuts_finds_some():
+    problem = dataclasses.replace(random_problem(3, 9, 1), resolution=1e-4)
+    plan, best = TaskSearch(CUTS).plan(problem), ExactSolver().solve(problem)
+    check(problem, plan)
+    assert 0.95 * best.cost < plan.lower_bound <= best.cost + 1e-3 <= plan.cost + 2e-3
+
+
+def test_a_replan_for_many_objects_does_not_start_from_scratch(monkeypatch):
+    floor, solved = two_rooms(), []
+    solve = ExactSolver.solve
+    monkeypatch.setattr(
+        ExactSolver, "solve", lambda *args, **named: solved.append(None) or solve(*args, **named)
+    )
+    task, source = Task(floor, 9, 0), SolverSource(floor, CUTS)
+    route = source.plan(task.state, None, shown=True)
+    for visit in (route.visits[4], route.visits[6]):
+        if visit.kind is VisitKind.PICK:
+            task.do(*visit)
+            plan = source.plan(task.state, route, shown=True).plan
+            assert plan.lower_bound > 0.9 * plan.cost
+            check(TaskProblems(floor).problem(task.state), plan)
+    assert len(solved) == 1
 
 
 def test_small_problems_do_not_load_the_solvers():

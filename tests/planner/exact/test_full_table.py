@@ -10,9 +10,12 @@ from planning_cases import random_problem
 from planner.exact import full_table
 from planner.exact.full_table import by_table
 from planner.exact.instance import FAR, make_instance
+from planner.exact.solver import ExactSolver
 from planner.exact.table import fill_layers, new_table, walk
 from planner.exact.table_kernels import fill
 from planner.exact.table_kernels import walk as compiled_walk
+from planner.plan import Status
+from planner.solvers import Deadline, SolveLimit
 
 cases = given(
     seed=st.integers(0, 2**32 - 1),
@@ -77,3 +80,17 @@ def test_a_table_is_the_same_whether_its_numbers_fit_in_32_bits_or_not(seed, n, 
         np.testing.assert_array_equal(
             one.object[some_picked, j].astype(np.int64) * scale, other.object[some_picked, j]
         )
+
+
+def test_a_table_is_given_up_when_time_is_over():
+    problem = random_problem(0, 10)
+    assert by_table(make_instance(problem, problem.integers.metric), Deadline(0.0)) == []
+    plan = ExactSolver().solve(random_problem(0, 18), limit=SolveLimit(seconds=1e-3))
+    assert plan.status is Status.FEASIBLE
+
+
+def test_a_time_limit_that_suffices_leaves_the_proof_of_the_table():
+    problem = random_problem(0, 16)
+    limited, plan = ExactSolver().solve(problem, limit=SolveLimit(seconds=1e3)), ExactSolver().solve(problem)
+    assert (limited.visits, limited.certificate) == (plan.visits, plan.certificate)
+    assert limited.status is Status.OPTIMAL

@@ -1,0 +1,87 @@
+"""Routing problems of five kinds for the planner benchmark, which are the same on every machine."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.house import House
+from planner.problem import RoutingProblem, Shipment
+from planner.route import TaskState
+from planner.task_problems import RESOLUTION, TaskProblems
+
+SIDE = 12.0  # side of the square that contains the places of random problems, in metres
+BINS = 6  # number of bins of random problems
+# Number of problems by kind and number of objects, 500 in total
+COUNTS: Mapping[str, Mapping[int, int]] = {
+    "apartment": {6: 30, 12: 30, 18: 30, 24: 30, 30: 12, 40: 8},
+    "mid-task": {6: 30, 12: 30, 18: 30, 24: 30, 30: 12, 40: 8},
+    "home": {6: 20, 12: 20, 18: 20, 24: 20},
+    "random": {12: 20, 24: 20, 30: 10, 40: 10, 60: 10},
+    "many bins": {6: 20, 12: 30, 18: 20},
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A routing problem with its kind, its number of objects and its seed."""
+
+    kind: str
+    objects: int
+    seed: int
+    problem: RoutingProblem
+
+
+def make_cases(counts: Mapping[str, Mapping[int, int]]) -> Iterator[Case]:
+    """Yield the problems with the lowest seeds, given their numbers as in `COUNTS`."""
+    houses: dict[str, tuple[House, TaskProblems]] = {}
+    for kind, sizes in counts.items():
+        for objects, count in sizes.items():
+            for seed in range(count):
+                yield Case(kind, objects, seed, _problem(kind, objects, seed, houses))
+
+
+def _problem(
+    kind: str, objects: int, seed: int, houses: dict[str, tuple[House, TaskProblems]]
+) -> RoutingProblem:
+    if kind in ("random", "many bins"):
+        return random_problem(objects, BINS if kind == "random" else objects, seed)
+    name = f"generated:{seed}" if kind == "home" else "apartment"
+    if name not in houses:
+        house = House.load(name)
+        houses[name] = house, TaskProblems(house.geodesics)
+    house, problems = houses[name]
+    begin = first_state(house, objects, seed)
+    if kind == "mid-task":
+        begin = mid_task(house, begin, np.random.default_rng([objects, seed]))
+    return problems.problem(begin)
+
+
+def random_problem(objects: int, bins: int, seed: int) -> RoutingProblem:
+    """Return a problem with random places in a square, where each bin receives about as many objects."""
+    places = SIDE * np.random.default_rng([objects, bins, seed]).random((1 + bins + objects, 2))
+    distances = np.linalg.norm(places[:, None] - places, axis=2)
+    shipments = tuple(Shipment(1 + bins + k, 1 + k % bins) for k in range(objects))
+    return RoutingProblem(distances, 0, shipments, resolution=RESOLUTION)
+
+
+def first_state(house: House, objects: int, seed: int) -> TaskState:
+    episode = house.sample_episode(objects=objects, seed=seed)
+    loose = {o.name: (o.position[0], o.position[1]) for o in episode.objects}
+    approach = {key: r.approach for key, r in house.receptacles.items()}
+    deliveries = {o: (float(approach[r][0]), float(approach[r][1])) for o, r in episode.targets.items()}
+    return TaskState((episode.start.x, episode.start.y), loose, (), deliveries)
+
+
+def mid_task(house: House, begin: TaskState, rng: np.random.Generator) -> TaskState:
+    """Return a random state in which some objects are delivered and up to two are carried."""
+    names = [str(name) for name in rng.permutation(list(begin.loose))]
+    carried = int(rng.integers(0, 3))
+    left = int(rng.integers(1, len(names) - carried + 1))
+    at = house.navmesh.sample(rng)
+    return TaskState(
+        (float(at[0]), float(at[1])),
+        {name: begin.loose[name] for name in names[:left]},
+        tuple(names[left : left + carried]),
+        begin.deliveries,
+    )
