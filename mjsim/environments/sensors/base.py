@@ -11,13 +11,22 @@ from dm_env import specs
 from numpy.typing import NDArray
 
 from mjsim.environments.episodes import CompiledEpisode
+from mjsim.environments.sensors.vector_kernels import (
+    EpisodeConstants,
+    Obstacles,
+    Snapshot,
+    compute_vectors,
+    vector_shapes,
+)
 from mjsim.house.compiled.footprint import Footprint
+from mjsim.house.scene.scene import Scene
 from mjsim.render import Frame
 from mjsim.values.episode import StartPose
 from mjsim.values.errors import EnvironmentConfigError
-from mjsim.values.observation import Observation
+from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.world.world import World
 
+_STATUSES = tuple(ObjectStatus)
 IMAGES = ("rgb", "depth", "segmentation")
 
 
@@ -66,16 +75,40 @@ class ObservationLayout:
         return math.hypot(x_max - x_min, y_max - y_min)
 
     @cached_property
-    def edges(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The start points and vectors of all obstacle edges, in metres, each of shape (edges, 2)."""
-        outlines = self.floor.obstacles
-        if not outlines:
-            return np.empty((0, 2)), np.empty((0, 2))
-        return np.vstack(outlines), np.vstack([np.roll(o, -1, axis=0) - o for o in outlines])
+    def vectors(self) -> "np.dtype[np.void]":
+        """The record type that contains the arrays of all vector sensors, by name."""
+        shapes = vector_shapes(self.slots, len(self.categories), len(self.receptacles))
+        return np.dtype([(name, np.float32, shape) for name, shape in shapes.items()])
 
-    def scaled(self, lengths: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Divide lengths in metres by `scale`, and clip the results to [-1, 1]."""
-        return np.clip(lengths / self.scale, -1.0, 1.0).astype(np.float32)
+    @cached_property
+    def obstacles(self) -> Obstacles:
+        outlines = self.floor.obstacles
+        sides = [np.hstack([outline, np.roll(outline, -1, axis=0) - outline]) for outline in outlines]
+        return Obstacles(
+            edges=np.vstack([np.zeros((0, 4)), *sides]),
+            first=np.cumsum([0, *map(len, outlines)]),
+            boxes=np.array([[*o.min(axis=0), *o.max(axis=0)] for o in outlines]).reshape(-1, 4),
+        )
+
+    def constants(self, scene: Scene) -> tuple[EpisodeConstants, NDArray[np.float32]]:
+        """Return an episode's constants for kernels, and its vectors with only the constant ones filled in."""
+        episode, vectors = scene.episode, np.zeros((), self.vectors)
+        for i, placed in enumerate(episode.objects):
+            vectors["object_mask"][i] = 1.0
+            vectors["object_categories"][i, self.categories.index(placed.category)] = 1.0
+        centers = {key: receptacle.center[:2] for key, receptacle in scene.receptacles.items()}
+        constants = EpisodeConstants(
+            offsets=np.array([offset // 4 for _, offset in (self.vectors.fields or {}).values()]),
+            start=np.array([episode.start.x, episode.start.y, episode.start.heading]),
+            bounds=np.array(self.floor.bounds),
+            receptacles=np.array([centers[key] for key in self.receptacles]).reshape(-1, 2),
+            bins=np.array([centers[episode.targets[name]] for name in scene.index.names]),
+            obstacles=self.obstacles,
+            scale=self.scale,
+            max_speed=float(self.max_speed),
+            time_limit=float(self.time_limit),
+        )
+        return constants, np.ndarray(vectors.nbytes // 4, np.float32, vectors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,15 +142,32 @@ class SensorInput:
         rgb, depth, segmentation = (channel in self.images for channel in IMAGES)
         return renderer.frame(self.world.data, rgb=rgb, depth=depth, segmentation=segmentation)
 
+    @cached_property
+    def vectors(self) -> NDArray[np.void]:
+        """The arrays of all vector sensors by name. They are computed once and shared by all sensors."""
+        scene, state = self.world.scene, self.state
+        constants, blank = scene.cached("sensor constants", lambda: self.layout.constants(scene))
+        values = blank.copy()
+        left, right = (-1 if name is None else state.object_names.index(name) for name in state.hands)
+        snapshot = Snapshot(
+            time=state.time,
+            position=state.position,
+            heading=state.heading,
+            pitch=state.pitch,
+            velocity=state.velocity,
+            hands=(left, right),
+            busy=state.busy,
+            object_positions=state.object_positions,
+            object_quaternions=state.object_quaternions,
+            object_status=np.array([_STATUSES.index(status) for status in state.object_status]),
+        )
+        compute_vectors(snapshot, constants, values)
+        return np.ndarray((), self.layout.vectors, values)
+
     def to_body(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Transform floor points (k, 2) from the house frame to the body frame (forward, left), in metres."""
-        return rotated(points - self.state.position, -self.state.heading)
-
-
-def rotated(vectors: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
-    """Rotate vectors of shape (..., 2) counter-clockwise by an angle in radians."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.asarray(vectors @ np.array([[c, s], [-s, c]]))
+        c, s = math.cos(self.state.heading), math.sin(self.state.heading)
+        return np.asarray((points - self.state.position) @ np.array([[c, -s], [s, c]]))
 
 
 @dataclass(frozen=True)
