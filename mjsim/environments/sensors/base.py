@@ -21,12 +21,14 @@ from mjsim.environments.sensors.vector_kernels import (
 from mjsim.house.compiled.footprint import Footprint
 from mjsim.house.scene.scene import Scene
 from mjsim.render import Frame
+from mjsim.support.kernels import specialized
 from mjsim.values.episode import StartPose
 from mjsim.values.errors import EnvironmentConfigError
 from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.world.world import World
 
 _STATUSES = tuple(ObjectStatus)
+_MARGIN = 1e-6  # tolerance for rounding errors, in metres
 IMAGES = ("rgb", "depth", "segmentation")
 
 
@@ -87,15 +89,15 @@ class ObservationLayout:
         return Obstacles(
             edges=np.vstack([np.zeros((0, 4)), *sides]),
             first=np.cumsum([0, *map(len, outlines)]),
-            boxes=np.array([[*o.min(axis=0), *o.max(axis=0)] for o in outlines]).reshape(-1, 4),
+            circles=np.array([_circle_around(outline) for outline in outlines]).reshape(-1, 3),
         )
 
-    def constants(self, scene: Scene) -> tuple[EpisodeConstants, NDArray[np.float32]]:
-        """Return an episode's constants for kernels, and its vectors with only the constant ones filled in."""
-        episode, vectors = scene.episode, np.zeros((), self.vectors)
+    def vectors_of(self, scene: Scene) -> Callable[[Observation], NDArray[np.void]]:
+        """Return a function that computes the arrays of all vector sensors from a state of an episode."""
+        episode, blank = scene.episode, np.zeros((), self.vectors)
         for i, placed in enumerate(episode.objects):
-            vectors["object_mask"][i] = 1.0
-            vectors["object_categories"][i, self.categories.index(placed.category)] = 1.0
+            blank["object_mask"][i] = 1.0
+            blank["object_categories"][i, self.categories.index(placed.category)] = 1.0
         centers = {key: receptacle.center[:2] for key, receptacle in scene.receptacles.items()}
         constants = EpisodeConstants(
             offsets=np.array([offset // 4 for _, offset in (self.vectors.fields or {}).values()]),
@@ -108,7 +110,26 @@ class ObservationLayout:
             max_speed=float(self.max_speed),
             time_limit=float(self.time_limit),
         )
-        return constants, np.ndarray(vectors.nbytes // 4, np.float32, vectors)
+        constant_vectors = np.ndarray(blank.nbytes // 4, np.float32, blank)
+        compute = specialized(compute_vectors, Snapshot.example(), constants, constant_vectors)
+
+        def vectors(state: Observation) -> NDArray[np.void]:
+            names, (left, right), values = state.object_names, state.hands, constant_vectors.copy()
+            hands = -1 if left is None else names.index(left), -1 if right is None else names.index(right)
+            statuses = np.array([_STATUSES.index(status) for status in state.object_status])
+            snapshot = Snapshot(
+                state.time, state.position, state.heading, state.pitch, state.velocity, hands, state.busy,
+                state.object_positions, state.object_quaternions, statuses,
+            )  # fmt: skip
+            compute(snapshot, constants, values)
+            return np.ndarray((), self.vectors, values)
+
+        return vectors
+
+
+def _circle_around(outline: NDArray[np.float64]) -> list[float]:
+    center = (outline.min(axis=0) + outline.max(axis=0)) / 2
+    return [*center, np.linalg.norm(outline - center, axis=1).max() + _MARGIN]
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,24 +166,8 @@ class SensorInput:
     @cached_property
     def vectors(self) -> NDArray[np.void]:
         """The arrays of all vector sensors by name. They are computed once and shared by all sensors."""
-        scene, state = self.world.scene, self.state
-        constants, blank = scene.cached("sensor constants", lambda: self.layout.constants(scene))
-        values = blank.copy()
-        left, right = (-1 if name is None else state.object_names.index(name) for name in state.hands)
-        snapshot = Snapshot(
-            time=state.time,
-            position=state.position,
-            heading=state.heading,
-            pitch=state.pitch,
-            velocity=state.velocity,
-            hands=(left, right),
-            busy=state.busy,
-            object_positions=state.object_positions,
-            object_quaternions=state.object_quaternions,
-            object_status=np.array([_STATUSES.index(status) for status in state.object_status]),
-        )
-        compute_vectors(snapshot, constants, values)
-        return np.ndarray((), self.layout.vectors, values)
+        scene = self.world.scene
+        return scene.cached("vectors", lambda: self.layout.vectors_of(scene))(self.state)
 
     def to_body(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Transform floor points (k, 2) from the house frame to the body frame (forward, left), in metres."""

@@ -54,7 +54,7 @@ class Obstacles(NamedTuple):
         Floats  # counter-clockwise edges of all obstacles: start x, start y, vector x, vector y, shape (e, 4)
     )
     first: Ints  # first row of each obstacle in `edges`, shape (p + 1,)
-    boxes: Floats  # bounding box of each obstacle: xmin, ymin, xmax, ymax, shape (p, 4)
+    circles: Floats  # a circle around each obstacle: centre x and y, radius, shape (p, 3)
 
 
 class EpisodeConstants(NamedTuple):
@@ -84,6 +84,12 @@ class Snapshot(NamedTuple):
     object_positions: Floats
     object_quaternions: Floats
     object_status: Ints  # index of each object's status in `ObjectStatus`, shape (n,)
+
+    @classmethod
+    def example(cls) -> "Snapshot":
+        """Return a snapshot with strided arrays. Code that is compiled for it also accepts contiguous arrays."""
+        pair, rows, statuses = np.zeros(4)[::2], np.zeros((1, 8))[:, ::2], np.zeros(2, np.int64)[::2]
+        return cls(0.0, pair, 0.0, 0.0, pair, (-1, -1), False, rows, rows, statuses)
 
 
 @kernel
@@ -149,21 +155,23 @@ def _find_ranges(x: float, y: float, heading: float, obstacles: Obstacles, out: 
     for r in range(RAYS):
         angle = heading + 2 * math.pi * r / RAYS
         forward_x[r], forward_y[r] = math.cos(angle), math.sin(angle)
-    for p, box in enumerate(obstacles.boxes):
-        if max(box[0] - x, box[1] - y, x - box[2], y - box[3]) > RANGE:
+    for p, circle in enumerate(obstacles.circles):
+        center_x, center_y, radius = circle[0] - x, circle[1] - y, circle[2]
+        if center_x**2 + center_y**2 > (RANGE + radius) ** 2:
             continue
-        for e in range(obstacles.first[p], obstacles.first[p + 1]):
-            start_x, start_y = obstacles.edges[e, 0] - x, obstacles.edges[e, 1] - y
-            edge_x, edge_y = obstacles.edges[e, 2], obstacles.edges[e, 3]
-            facing = edge_x * start_y - edge_y * start_x
-            if facing <= 0:
+        for r in range(RAYS):
+            if abs(forward_x[r] * center_y - forward_y[r] * center_x) > radius:
                 continue
-            for r in range(RAYS):  # without branches, so that the loop is vectorized
+            if not -radius < forward_x[r] * center_x + forward_y[r] * center_y < distances[r] + radius:
+                continue
+            for e in range(obstacles.first[p], obstacles.first[p + 1]):
+                start_x, start_y = obstacles.edges[e, 0] - x, obstacles.edges[e, 1] - y
+                edge_x, edge_y = obstacles.edges[e, 2], obstacles.edges[e, 3]
+                facing = edge_x * start_y - edge_y * start_x
                 across = forward_y[r] * edge_x - forward_x[r] * edge_y
                 along = start_y * forward_x[r] - start_x * forward_y[r]  # from 0 to `across` on the edge
-                distance = facing / across
-                is_nearer = (along >= 0) & (along <= across) & (distance < distances[r])
-                distances[r] = distance if is_nearer else distances[r]
+                if facing > 0 and 0 <= along <= across and facing < distances[r] * across:
+                    distances[r] = facing / across
     for r in range(RAYS):
         out[r] = distances[r] / RANGE
 
