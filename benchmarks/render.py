@@ -17,7 +17,7 @@ from unittest import mock
 import mujoco
 import numpy as np
 
-from benchmarks.support.environment_speed import SETTINGS, steps_per_second
+from benchmarks.environments import SETTINGS, steps_per_second
 from benchmarks.support.hud_speed import hud_milliseconds, session_states, summary
 from benchmarks.support.requirements import outcome
 from experiments.house import House

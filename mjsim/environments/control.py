@@ -68,14 +68,15 @@ class Continuous:
     def steps(self, action: Any, observation: Observation, world: World) -> Steps:  # noqa: ARG002
         """Return the steps that execute an action. Raise an ActionError if the action is invalid."""
         try:
-            values = np.asarray(action, dtype=np.float64)
+            array = np.asarray(action, dtype=np.float64)
         except (TypeError, ValueError):
-            values = np.empty(0)
-        if values.shape != (4,) or not np.isfinite(values).all():
+            array = np.empty(0)
+        values = array.tolist() if array.shape == (4,) else []
+        if not values or not all(map(math.isfinite, values)):
             raise ActionError(
                 f"an action is (forward, left, turn, trigger), four finite numbers; got {action!r:.200}"
             )
-        forward, left, turn, trigger = np.clip(values, -1.0, 1.0).tolist()
+        forward, left, turn, trigger = (min(max(value, -1.0), 1.0) for value in values)
         person = world.scene.person
         speed = person.fastest_walk
         move = Move(speed * forward, speed * left, person.turning_speed * turn)

@@ -79,6 +79,7 @@ class Rearrangement:
         self._own_sensors = [s for s in self.sensors if SENSORS.get(s.name) is not s]
         self._images = frozenset[str]().union(*(s.images for s in sensors))
         self._episode: CompiledEpisode | None = None
+        self._state: Observation  # state after the latest step, set by `reset`
         self._seed = 0
         self._actions: list[Any] = []  # actions executed in the current episode
         self._is_over = True
@@ -135,7 +136,8 @@ class Rearrangement:
         """
         self.prepare(seed)
         self._is_over = False
-        inputs = self._sensor_input(self.world.reset())
+        self._state = self.world.reset()
+        inputs = self._sensor_input(self._state)
         return self._observe(inputs), self._info(inputs, ())
 
     def reset_random(self, rng: np.random.Generator) -> tuple[ObservationDict, dict[str, Any]]:
@@ -159,9 +161,9 @@ class Rearrangement:
         if self._is_over:
             raise EnvironmentStateError("the episode is over; call reset before the next step")
         self._actions.append(copy(action))  # copied because the agent may reuse its array
-        before = world.observation()
+        before = self._state
         steps, error = self._run(world, action, before)
-        after = steps[-1].observation if steps else before
+        after = self._state = steps[-1].observation if steps else before
         terminated, timed_out = self._end(after)
         self._is_over = terminated or timed_out or error is not None
         inputs = self._sensor_input(after)
@@ -215,7 +217,7 @@ class Rearrangement:
 
     def _end(self, observation: Observation) -> tuple[bool, bool]:
         """Return whether the task is complete, and whether it has timed out."""
-        done = all(s is ObjectStatus.DELIVERED for s in observation.object_status)
+        done = observation.object_status.count(ObjectStatus.DELIVERED) == len(observation.object_names)
         return done, not done and observation.time >= self.layout.time_limit - 1e-9
 
     def _sensor_input(self, state: Observation) -> SensorInput:
@@ -255,7 +257,7 @@ class Rearrangement:
         self, inputs: SensorInput, steps: Sequence[StepResult], error: PhysicsError | None = None
     ) -> dict[str, Any]:
         state = inputs.state
-        delivered = len(state.names_with(ObjectStatus.DELIVERED))
+        delivered = state.object_status.count(ObjectStatus.DELIVERED)
         kinds = [event.kind for step in steps for event in step.events]
         refusals = [s.result.refusal for s in steps if s.result is not None and s.result.refusal is not None]
         info: dict[str, Any] = {

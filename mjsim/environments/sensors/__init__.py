@@ -2,33 +2,17 @@
 
 from collections.abc import Sequence
 
-from mjsim.environments.sensors import house, person, task, vision
+from mjsim.environments.sensors import house, vision
 from mjsim.environments.sensors.base import IMAGES, Sensor, SensorInput, unit_spec
+from mjsim.environments.sensors.vectors import VECTORS
 from mjsim.values.errors import EnvironmentConfigError
 
 __all__ = ["BUNDLES", "IMAGES", "SENSORS", "Sensor", "SensorInput", "resolve_sensors", "unit_spec"]
 
-_VECTORS = (
-    person.GPS,
-    person.COMPASS,
-    person.POSE,
-    person.MOTION,
-    person.INVENTORY,
-    house.RANGEFINDER,
-    house.RECEPTACLES,
-    task.OBJECT_MASK,
-    task.OBJECT_POSITIONS,
-    task.OBJECT_ROTATIONS,
-    task.OBJECT_STATUS,
-    task.OBJECT_CATEGORIES,
-    task.GOALS,
-    task.REMAINING,
-    task.TIME_LEFT,
-)
 _OTHERS = (house.MAP, vision.IN_VIEW, vision.RGB, vision.DEPTH, vision.SEGMENTATION, vision.VISIBLE_PIXELS)
 
-SENSORS = {sensor.name: sensor for sensor in (*_VECTORS, *_OTHERS)}
-BUNDLES = {"state": _VECTORS}
+SENSORS = {sensor.name: sensor for sensor in (*VECTORS, *_OTHERS)}
+BUNDLES = {"state": VECTORS}
 
 
 def resolve_sensors(observations: Sequence[str | Sensor]) -> tuple[Sensor, ...]:

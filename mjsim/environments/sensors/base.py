@@ -11,13 +11,24 @@ from dm_env import specs
 from numpy.typing import NDArray
 
 from mjsim.environments.episodes import CompiledEpisode
+from mjsim.environments.sensors.vector_kernels import (
+    EpisodeConstants,
+    Obstacles,
+    Snapshot,
+    compute_vectors,
+    vector_shapes,
+)
 from mjsim.house.compiled.footprint import Footprint
+from mjsim.house.scene.scene import Scene
 from mjsim.render import Frame
+from mjsim.support.kernels import specialized
 from mjsim.values.episode import StartPose
 from mjsim.values.errors import EnvironmentConfigError
-from mjsim.values.observation import Observation
+from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.world.world import World
 
+_STATUSES = tuple(ObjectStatus)
+_MARGIN = 1e-6  # tolerance for rounding errors, in metres
 IMAGES = ("rgb", "depth", "segmentation")
 
 
@@ -66,16 +77,59 @@ class ObservationLayout:
         return math.hypot(x_max - x_min, y_max - y_min)
 
     @cached_property
-    def edges(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The start points and vectors of all obstacle edges, in metres, each of shape (edges, 2)."""
-        outlines = self.floor.obstacles
-        if not outlines:
-            return np.empty((0, 2)), np.empty((0, 2))
-        return np.vstack(outlines), np.vstack([np.roll(o, -1, axis=0) - o for o in outlines])
+    def vectors(self) -> "np.dtype[np.void]":
+        """The record type that contains the arrays of all vector sensors, by name."""
+        shapes = vector_shapes(self.slots, len(self.categories), len(self.receptacles))
+        return np.dtype([(name, np.float32, shape) for name, shape in shapes.items()])
 
-    def scaled(self, lengths: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Divide lengths in metres by `scale`, and clip the results to [-1, 1]."""
-        return np.clip(lengths / self.scale, -1.0, 1.0).astype(np.float32)
+    @cached_property
+    def obstacles(self) -> Obstacles:
+        outlines = self.floor.obstacles
+        sides = [np.hstack([outline, np.roll(outline, -1, axis=0) - outline]) for outline in outlines]
+        return Obstacles(
+            edges=np.vstack([np.zeros((0, 4)), *sides]),
+            first=np.cumsum([0, *map(len, outlines)]),
+            circles=np.array([_circle_around(outline) for outline in outlines]).reshape(-1, 3),
+        )
+
+    def vectors_of(self, scene: Scene) -> Callable[[Observation], NDArray[np.void]]:
+        """Return a function that computes the arrays of all vector sensors from a state of an episode."""
+        episode, blank = scene.episode, np.zeros((), self.vectors)
+        for i, placed in enumerate(episode.objects):
+            blank["object_mask"][i] = 1.0
+            blank["object_categories"][i, self.categories.index(placed.category)] = 1.0
+        centers = {key: receptacle.center[:2] for key, receptacle in scene.receptacles.items()}
+        constants = EpisodeConstants(
+            offsets=np.array([offset // 4 for _, offset in (self.vectors.fields or {}).values()]),
+            start=np.array([episode.start.x, episode.start.y, episode.start.heading]),
+            bounds=np.array(self.floor.bounds),
+            receptacles=np.array([centers[key] for key in self.receptacles]).reshape(-1, 2),
+            bins=np.array([centers[episode.targets[name]] for name in scene.index.names]),
+            obstacles=self.obstacles,
+            scale=self.scale,
+            max_speed=float(self.max_speed),
+            time_limit=float(self.time_limit),
+        )
+        constant_vectors = np.ndarray(blank.nbytes // 4, np.float32, blank)
+        compute = specialized(compute_vectors, Snapshot.example(), constants, constant_vectors)
+
+        def vectors(state: Observation) -> NDArray[np.void]:
+            names, (left, right), values = state.object_names, state.hands, constant_vectors.copy()
+            hands = -1 if left is None else names.index(left), -1 if right is None else names.index(right)
+            statuses = np.array([_STATUSES.index(status) for status in state.object_status])
+            snapshot = Snapshot(
+                state.time, state.position, state.heading, state.pitch, state.velocity, hands, state.busy,
+                state.object_positions, state.object_quaternions, statuses,
+            )  # fmt: skip
+            compute(snapshot, constants, values)
+            return np.ndarray((), self.vectors, values)
+
+        return vectors
+
+
+def _circle_around(outline: NDArray[np.float64]) -> list[float]:
+    center = (outline.min(axis=0) + outline.max(axis=0)) / 2
+    return [*center, np.linalg.norm(outline - center, axis=1).max() + _MARGIN]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,15 +163,16 @@ class SensorInput:
         rgb, depth, segmentation = (channel in self.images for channel in IMAGES)
         return renderer.frame(self.world.data, rgb=rgb, depth=depth, segmentation=segmentation)
 
+    @cached_property
+    def vectors(self) -> NDArray[np.void]:
+        """The arrays of all vector sensors by name. They are computed once and shared by all sensors."""
+        scene = self.world.scene
+        return scene.cached("vectors", lambda: self.layout.vectors_of(scene))(self.state)
+
     def to_body(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Transform floor points (k, 2) from the house frame to the body frame (forward, left), in metres."""
-        return rotated(points - self.state.position, -self.state.heading)
-
-
-def rotated(vectors: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
-    """Rotate vectors of shape (..., 2) counter-clockwise by an angle in radians."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.asarray(vectors @ np.array([[c, s], [-s, c]]))
+        c, s = math.cos(self.state.heading), math.sin(self.state.heading)
+        return np.asarray((points - self.state.position) @ np.array([[c, -s], [s, c]]))
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
@@ -34,7 +35,7 @@ def resolve_pick(
         return replace(answer, refusal=Refusal.ALREADY_DELIVERED)
     if not inventory.free_hands:
         return replace(answer, refusal=Refusal.HANDS_FULL)
-    if _object_distance(person, item) > person.parameters.reach or not _object_in_sight(person, item):
+    if _object_distances(person, [item])[0] > person.parameters.reach or not _object_in_sight(person, item):
         return replace(answer, refusal=Refusal.OUT_OF_REACH)
     return answer
 
@@ -45,8 +46,10 @@ def _pick_nearest(
     if not inventory.free_hands:
         return ActionResult(action, Refusal.HANDS_FULL)
     loose = [i for i, s in enumerate(status) if s is ObjectStatus.LOOSE]
-    near = sorted((d, i) for i in loose if (d := _object_distance(person, i)) <= person.parameters.reach)
-    for _, item in near:
+    distances = _object_distances(person, loose)
+    for distance, item in sorted(zip(distances, loose, strict=True)):
+        if distance > person.parameters.reach:
+            break
         if _object_in_sight(person, item):
             name = person.scene.index.names[item]
             return ActionResult(action, None, name, person.scene.episode.targets[name])
@@ -85,8 +88,9 @@ def _distance(person: Person, key: str) -> float:
     return person.scene.receptacles[key].distance(person.rig.position)
 
 
-def _object_distance(person: Person, item: int) -> float:
-    return float(np.linalg.norm(person.center(item)[:2] - person.rig.position))
+def _object_distances(person: Person, items: list[int]) -> list[float]:
+    offsets = person.data.xipos[person.scene.index.bodies[items], :2] - person.rig.position
+    return cast(list[float], np.hypot(offsets[:, 0], offsets[:, 1]).tolist())
 
 
 def _object_in_sight(person: Person, item: int) -> bool:

@@ -1,5 +1,8 @@
 """A simulation that moves the person and the objects without physics, and copies their poses to MuJoCo."""
 
+import functools
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +11,7 @@ from mjsim.house.compiled.footprint import Floor
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene
+from mjsim.support.kernels import specialized
 from mjsim.values.errors import StateError
 from mjsim.values.inventory import LEFT
 from mjsim.values.observation import StepStates
@@ -144,8 +148,12 @@ class KinematicWorld:
 
     def walk(self, moves: NDArray[np.float64]) -> StepStates | None:
         """Execute one control step per row of `moves` (n, 4). Return the states between the steps."""
-        walk_rows(moves, self.state, self.model, self._rows)
+        self._walk_rows(moves, self.state, self.model, self._rows)
         return self._passed(len(moves))
+
+    @functools.cached_property
+    def _walk_rows(self) -> Callable[[NDArray[np.float64], KinematicState, KinematicModel, StepStates], None]:
+        return specialized(walk_rows, np.empty((1, 4)), self.state, self.model, self._rows)
 
     def follow(
         self, walk: Walk, progress: NDArray[np.float64], limit: int

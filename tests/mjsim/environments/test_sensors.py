@@ -14,7 +14,8 @@ from small_worlds import episode_of
 import mjsim
 from mjsim.environments.sensors import SENSORS, Sensor, resolve_sensors, unit_spec
 from mjsim.environments.sensors.base import CameraOptions
-from mjsim.environments.sensors.house import MAP_SIZE, RANGE, RAYS
+from mjsim.environments.sensors.house import MAP_SIZE
+from mjsim.environments.sensors.vector_kernels import RANGE, RAYS
 from mjsim.environments.sensors.vision import visible_pixels
 from mjsim.values.errors import EnvironmentConfigError
 

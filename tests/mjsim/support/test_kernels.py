@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from experiments.trials.warmup import NOT_KEPT, NOTICE
@@ -109,3 +110,13 @@ def test_compiling_is_announced_once(tmp_path, kept):
     run = subprocess.run([sys.executable, source], env=environment, capture_output=True, text=True)
     assert run.stdout.strip() == "2 2.5"
     assert run.stderr == f"mjsim: {NOTICE if kept else NOT_KEPT.format(folder=cache)}\n"
+
+
+def test_specialized_code_is_that_of_the_kernel():
+    @kernels.kernel
+    def total(pair):
+        return pair[0].sum() + pair[1]
+
+    code = kernels.specialized(total, (np.ones(2), 1.0))
+    assert code((np.array([2.0, 3.0, 4.0]), 5.0)) == 14.0 == total((np.array([2.0, 3.0, 4.0]), 5.0))
+    assert len(total.signatures) == 1 and code is not total

@@ -1,19 +1,21 @@
-"""Measure the speed of the environment: steps and resets per core-second, and the speed-up by processes.
+"""Measure the speed of the environment: steps and resets per core-second, and the speed-up by processes."""
 
-python -m benchmarks.support.environment_speed
-"""
-
+import statistics
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import gymnasium
-from rich.console import Console
-from rich.table import Table
+
+from benchmarks.support.requirements import outcome
+from mjsim.values.options import FIDELITIES, WorldOptions
 
 ID = "mjsim.environments:mjsim/Rearrange-v0"
-SECONDS = 3.0
+SECONDS = 1.0
+ROUNDS = 3
+CONSTANT = "constant map"  # observations that take no time to compute
 SETTINGS: dict[str, dict[str, Any]] = {
-    "one number": {"observations": ("remaining",)},
+    CONSTANT: {"observations": ("map",)},
     "state": {"observations": ("state",)},
     "state, in_view": {"observations": ("state", "in_view")},
     "state, rgb 128 x 96": {"observations": ("state", "rgb")},
@@ -85,17 +87,45 @@ def vector_speedup(processes: int, steps: int = 300, rounds: int = 4) -> float:
     return rates[1] / rates[0]
 
 
-def main() -> None:
-    table = Table("observations", "steps per core-second", "simulated s per core-second")
-    for name, options in SETTINGS.items():
-        steps, simulated = steps_per_second(options)
-        table.add_row(name, f"{steps:.0f}", f"{simulated:.0f}")
-    console = Console()
-    console.print(table)
-    console.print(f"reset to a new house: {seconds_per_reset(None, 10) * 1e3:.0f} ms")
-    console.print(f"reset to one of 4 houses that repeat: {seconds_per_reset(4, 400) * 1e3:.2f} ms")
-    console.print(f"2 environments in 2 processes: {vector_speedup(2):.2f} times as many steps as one")
+def measure(*, quick: bool = False) -> dict[str, Any]:
+    """Measure all settings in turn, in several rounds, so that the ratios are reliable on a busy machine."""
+    seconds, rounds = (SECONDS / 4, 1) if quick else (SECONDS, ROUNDS)
+    rates: dict[str, dict[str, list[tuple[float, float]]]] = {
+        fidelity: {name: [] for name in SETTINGS} for fidelity in FIDELITIES
+    }
+    for _ in range(rounds):
+        for fidelity, rows in rates.items():
+            for name, options in SETTINGS.items():
+                world = WorldOptions(fidelity=fidelity)
+                rows[name].append(steps_per_second({**options, "world": world}, seconds))
+    medians = {
+        fidelity: {
+            name: [statistics.median(column) for column in zip(*row, strict=True)]
+            for name, row in rows.items()
+        }
+        for fidelity, rows in rates.items()
+    }
+    return {
+        "rates": medians,  # steps and simulated seconds per core-second
+        "state_share": {fidelity: rows["state"][0] / rows[CONSTANT][0] for fidelity, rows in medians.items()},
+        "new_house_ms": 1e3 * seconds_per_reset(None, 2 if quick else 10),
+        "repeated_house_ms": 1e3 * seconds_per_reset(4, 20 if quick else 400),
+        "two_processes": vector_speedup(2, rounds=1 if quick else 4),
+    }
 
 
-if __name__ == "__main__":
-    main()
+def lines(result: dict[str, Any]) -> Iterator[str]:
+    yield "random actions, 6 objects; steps per core-second (simulated seconds per core-second)"
+    yield "| observations | " + " | ".join(result["rates"]) + " |"
+    yield "|---" * (1 + len(result["rates"])) + "|"
+    for name in SETTINGS:
+        cells = (
+            f"{steps:.0f} ({simulated:.0f})"
+            for steps, simulated in (r[name] for r in result["rates"].values())
+        )
+        yield f"| {name} | " + " | ".join(cells) + " |"
+    yield f"reset to a new house: {result['new_house_ms']:.0f} ms"
+    yield f"reset to one of 4 houses that repeat: {result['repeated_house_ms']:.2f} ms"
+    yield f"2 environments in 2 processes: {result['two_processes']:.2f} times as many steps as one"
+    share = result["state_share"]["full"]
+    yield f"steps with `state` over steps with a constant, full: {share:.2f} (>= 0.85: {outcome(share, '>=', 0.85)})"
