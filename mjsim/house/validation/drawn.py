@@ -59,8 +59,11 @@ def coplanar_faces(compiled: Compiled) -> list[DrawnFault]:
     upright = np.abs(compiled.data.geom_xmat[geoms]).reshape(-1, 3, 3).max(axis=1).min(axis=1) > 1 - 1e-6
     geoms = geoms[upright]
     low, high = _boxes(compiled, geoms)
-    plain = model.mat_texid[model.geom_matid[geoms]].max(axis=1) < 0
-    alike = plain & (model.geom_matid[geoms][:, None] == model.geom_matid[geoms])
+    textured = np.append(
+        (model.mat_texid >= 0).any(axis=1), False
+    )  # the last row is for geoms without material
+    paint = np.column_stack([model.geom_matid[geoms], model.geom_rgba[geoms]])
+    alike = ~textured[model.geom_matid[geoms]] & (paint[:, None] == paint).all(axis=2)
     found = []
     for axis, sign in itertools.product(range(3), (-1, 1)):
         a, b = (k for k in range(3) if k != axis)
