@@ -34,8 +34,7 @@ from mjsim.values.errors import HouseError
 ATTEMPTS = 6
 SIZES = 4  # number of sizes that are tried for each piece of furniture
 BARE = 0.285  # minimum covered share of a home's floor, below which more furniture is added
-LARGE_ROOMS = 4  # number of rooms from which on a home has `LARGE_POINTS` points for objects
-LARGE_POINTS = 24
+LARGE_ROOMS, LARGE_POINTS = 4, 24  # minimum number of points for objects in homes of that many rooms or more
 LEAST, MOST = 0.26, 0.44  # minimum and maximum share of the floor that furniture covers
 MAX_FAILURES = 4  # number of failed placements after which a room counts as full
 # A wash corner has a screen that would block a door, and a kitchenette has a cooker, so both avoid doors.
