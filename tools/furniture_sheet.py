@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.generator.files import house_files
-from mjsim.generator.furnish import placed
 from mjsim.generator.furniture.appearance import draw_appearance
 from mjsim.generator.furniture.catalogue import KINDS
 from mjsim.generator.furniture.piece import Piece
 from mjsim.generator.palette import draw_palette
+from mjsim.generator.placements import placed
 from mjsim.generator.recipe import Recipe
 from mjsim.generator.space import PiecePose
 from mjsim.generator.values import Furnishing, HomePlan, Placement, Rectangle, Room, Window

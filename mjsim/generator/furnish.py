@@ -23,7 +23,7 @@ from mjsim.generator.default_furniture import (
 from mjsim.generator.furniture.appearance import Appearance, draw_appearance
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.catalogue import KINDS
-from mjsim.generator.furniture.piece import BIN_SIZES, Mount, Piece, flattened, moved
+from mjsim.generator.furniture.piece import BIN_SIZES, Mount, Piece, Point, flattened, moved
 from mjsim.generator.placements import describe_place, drop_points, placed, places_for_objects
 from mjsim.generator.poses import WALL_GAP
 from mjsim.generator.space import UNUSED, PiecePose, Space
@@ -34,7 +34,7 @@ from mjsim.values.errors import HouseError
 ATTEMPTS = 6
 SIZES = 4  # number of sizes that are tried for each piece of furniture
 BARE = 0.285  # minimum covered share of a home's floor, below which more furniture is added
-LARGE = (4, 24)  # minimum number of places for objects (second value) in homes of at least that many rooms
+LARGE_ROOMS, LARGE_POINTS = 4, 24  # minimum number of points for objects in homes of that many rooms or more
 LEAST, MOST = 0.26, 0.44  # minimum and maximum share of the floor that furniture covers
 MAX_FAILURES = 4  # number of failed placements after which a room counts as full
 # A wash corner has a screen that would block a door, and a kitchenette has a cooker, so both avoid doors.
@@ -56,6 +56,7 @@ class FurnishedHome:
         ]
         self.uses = {space.room.key: self._use(space) for space in self.spaces}
         self.mounts: list[BinPlacement] = []
+        self.places: tuple[Point, ...] = ()
         self.seats = 0
         self.needed = sum(space.room.use in ("bedroom", "studio") for space in self.spaces) + 1
 
@@ -211,15 +212,16 @@ class FurnishedHome:
                 _ = any(self.put(space, kind) for kind in FALLBACKS)
 
     def check(self) -> None:
-        """Raise `HouseError` if a room is empty, or if there is too little or too much furniture."""
+        """Find places for objects. Raise `HouseError` if they are too few, or a room has too much or no furniture."""
         share = sum(space.area for space in self.spaces) / self.plan.area
         if not LEAST <= share <= MOST:
             raise HouseError(f"{share:.0%} of the floor is furnished in seed {self.seed}")
         for space in self.spaces:
             if not any(piece.parts and piece.kind not in BIN_SIZES for piece, _ in space.stood):
                 raise HouseError(f"nothing fits into {space.room.key} of seed {self.seed}")
-        points = drop_points(self.plan, self.furnishing().places)
-        if len(self.plan.rooms) >= LARGE[0] and points < LARGE[1]:
+        self.places = places_for_objects(self.spaces, self.mounts)
+        points = drop_points(self.plan, self.places)
+        if len(self.plan.rooms) >= LARGE_ROOMS and points < LARGE_POINTS:
             raise HouseError(f"only {points} objects fit into seed {self.seed}")
 
     def _put_defaults(self, space: Space, again: int = 0) -> None:
@@ -258,7 +260,7 @@ class FurnishedHome:
             for piece, pose in space.stood
             for placement in placed(space.room.key, piece, pose, self.look)
         ]
-        return Furnishing(tuple(placements), tuple(self.mounts), places_for_objects(self.spaces, self.mounts))
+        return Furnishing(tuple(placements), tuple(self.mounts), self.places)
 
 
 def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> Furnishing:

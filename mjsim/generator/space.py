@@ -77,9 +77,7 @@ class Space:
     hung: list[tuple[Side, float, float, float]] = field(default_factory=list)
     stood: list[tuple[Piece, PiecePose]] = field(default_factory=list)
     beside: list[Spot] = field(default_factory=list)  # floor next to doors, which bins must avoid
-    ways: list[Spot] = field(
-        default_factory=list
-    )  # floor in doorways, where no person may stand to use a bin
+    ways: list[Spot] = field(default_factory=list)  # floor before doors, on which no person may stand
     drawn: Boxes = field(default_factory=lambda: np.empty((0, 6)))  # boxes of all drawn geoms in the room
     area: float = 0.0  # floor area covered by furniture, in square metres
 
@@ -175,7 +173,7 @@ class Space:
         return not intersect(np.hstack([low, high]), self.drawn)
 
     def record(self, piece: Piece, place: PiecePose) -> None:
-        """Record a piece that takes up no floor at its final pose."""
+        """Record a piece, and what is drawn of it, at its final pose."""
         self.stood.append((piece, place))
         self.drawn = np.concatenate([self.drawn, moved_boxes(piece.drawn, place.x, place.y, place.yaw)])
 

@@ -56,17 +56,18 @@ def coplanar_faces(compiled: Compiled) -> list[DrawnFault]:
     """
     model, geoms = compiled.model, _drawn(compiled)
     geoms = geoms[model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_BOX]
-    upright = np.abs(compiled.data.geom_xmat[geoms]).reshape(-1, 3, 3).max(axis=1).min(axis=1) > 1 - 1e-6
-    geoms = geoms[upright]
+    geoms = geoms[np.abs(compiled.data.geom_xmat[geoms]).reshape(-1, 3, 3).max(axis=1).min(axis=1) > 1 - 1e-6]
     low, high = _boxes(compiled, geoms)
-    plain = model.mat_texid[model.geom_matid[geoms]].max(axis=1) < 0
-    alike = plain & (model.geom_matid[geoms][:, None] == model.geom_matid[geoms])
+    textured = np.append(
+        (model.mat_texid >= 0).any(axis=1), False
+    )  # the last row is for geoms without material
+    paint = np.column_stack([model.geom_matid[geoms], model.geom_rgba[geoms]])
+    alike = ~textured[model.geom_matid[geoms]] & (paint[:, None] == paint).all(axis=2)
     found = []
     for axis, sign in itertools.product(range(3), (-1, 1)):
         a, b = (k for k in range(3) if k != axis)
         at = (high if sign > 0 else low)[:, axis]
-        seen = at > EYES[0] if sign < 0 else at < EYES[1]
-        seen |= axis < 2
+        seen = (at > EYES[0] if sign < 0 else at < EYES[1]) | (axis < 2)
         shared = np.maximum(np.minimum(high[:, None], high) - np.maximum(low[:, None], low), 0.0)
         area = shared[..., a] * shared[..., b]
         pairs = np.argwhere(np.triu((np.abs(at[:, None] - at) < FLUSH) & (area > FLICKER) & ~alike & seen, 1))

@@ -62,6 +62,16 @@ def test_faces_in_one_plane_flicker_by_their_common_area(geoms: str, area: float
     assert max((fault.amount for fault in found), default=0.0) == pytest.approx(area)
 
 
+def test_geoms_without_materials_flicker_by_colour() -> None:
+    plain = '<geom type="box" size="0.1 0.1 0.1" rgba="{} 0 0 1" pos="{} 0 0"/>'
+    model = mujoco.MjModel.from_xml_string(
+        f"<mujoco><worldbody><body>{plain.format(1, 0)}{plain.format(0.5, 0.1)}</body>"
+        f'<body pos="0 3 0">{plain.format(1, 0)}{plain.format(1, 0.1)}</body></worldbody></mujoco>'
+    )
+    found = coplanar_faces(Compiled.of("house", Path("house.xml"), model))
+    assert found and {(f.first, f.second) for f in found} == {(0, 1)}
+
+
 def test_hidden_faces_do_not_flicker() -> None:
     hull = '<geom type="box" size="0.5 0.5 0.5"/>'
     assert not coplanar_faces(compiled(box() + box(0.1, material="blue") + hull))
