@@ -33,7 +33,7 @@ def trials(home: tuple[int, int]) -> list[dict[str, Any]]:
     rooms, seed = home
     name = f"generated:{seed}?rooms={rooms}"
     house = House.load(name)
-    return [{"home": name, "person": who, **_run(house, seed, person)} for who, person in PEOPLE.items()]
+    return [{"home": name, "person": key, **_run(house, seed, person)} for key, person in PEOPLE.items()]
 
 
 def _run(house: House, seed: int, person: Mapping[str, float]) -> dict[str, Any]:

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from experiments.house import House
 from experiments.participants.base import Percept, Point, estimated_distances
-from mjsim.house.compiled.sites import ReceptacleGeometry
-from mjsim.house.compiled.standing import Goal
+from mjsim.house.compiled.standing import Goal, middle
 from mjsim.values.actions import Pick
 from mjsim.world.walking.polyline import path_length, point_along
 from planner.plan import Visit, VisitKind
@@ -63,7 +62,7 @@ class Approach:
         The walk normally ends as soon as the person is within `stop_distance` of the goal. If a wall is in the
         way there, the path is cut at a suitable place beyond. If there is none, nothing changes.
         """
-        key = (*_middle(goal).tolist(), stop_distance)
+        key = (*middle(goal).tolist(), stop_distance)
         if self._walk is None or self._walk[0] is not path or self._walk[1] != key:
             self._walk = path, key, self._cut(path, goal, stop_distance)
         cut = self._walk[2]
@@ -71,10 +70,10 @@ class Approach:
 
     def _cut(self, path: NDArray[np.float64], goal: Goal, stop_distance: float) -> NDArray[np.float64] | None:
         """Return the part of a path up to a suitable place. Return None if the usual place is suitable or none is."""
-        middle, suits = _middle(goal), self._house.standing.suits
+        at, suits = middle(goal), self._house.standing.suits
         arcs = np.append(np.arange(0.0, path_length(path), SPACING), path_length(path))
         points = [np.array(point_along(path, float(arc))) for arc in arcs]
-        gaps = [math.dist(point, middle) for point in points]
+        gaps = [math.dist(point, at) for point in points]
         first = next((k for k, gap in enumerate(gaps) if gap <= stop_distance), len(points) - 1)
         if suits(points[first], goal):
             return None
@@ -85,10 +84,6 @@ class Approach:
                 return _first_part(path, float(arcs[k]))
             was_suitable = is_suitable
         return None
-
-
-def _middle(goal: Goal) -> Point:
-    return goal.center[:2] if isinstance(goal, ReceptacleGeometry) else goal
 
 
 def _first_part(path: NDArray[np.float64], arc: float) -> NDArray[np.float64]:

@@ -60,9 +60,10 @@ class StandingPlaces:
 
     def is_free(self, stand: Point, goal: Goal) -> bool:
         """Return True if no wall or tall piece of furniture is in the way of a straight reach."""
-        height, end = REACH_HEIGHT, goal
         if isinstance(goal, ReceptacleGeometry):
-            height, end = max(height, float(goal.center[2] + goal.half_size[2])), goal.nearest(stand, RIM)
+            height, end = max(REACH_HEIGHT, goal.center[2] + goal.half_size[2]), goal.nearest(stand, RIM)
+        else:
+            height, end = REACH_HEIGHT, goal
         along = end - stand
         length = math.hypot(*along)
         if length < RIM:
@@ -109,14 +110,17 @@ class StandingPlaces:
 
     def _navigable_around(self, goal: Goal) -> Iterator[Point]:
         """Yield places on the largest island around a goal. A receptacle must be visible from them."""
-        receptacle = goal if isinstance(goal, ReceptacleGeometry) else None
-        middle = goal if receptacle is None else receptacle.center[:2]
         for share, k in itertools.product(DISTANCES, range(DIRECTIONS)):
             angle = 2 * math.pi * k / DIRECTIONS
-            place = middle + share * self.person.reach * np.array([math.cos(angle), math.sin(angle)])
+            place = middle(goal) + share * self.person.reach * np.array([math.cos(angle), math.sin(angle)])
+            if math.dist(self.navigable.snap(place, math.inf), place) > 0.0:
+                continue
             eye = np.array([*place, self.person.eye_height])
-            reachable = math.dist(self.navigable.snap(place, math.inf), place) == 0.0
-            if reachable and (
-                receptacle is None or receptacle_in_sight(self.model, self.data, eye, receptacle)
+            if not isinstance(goal, ReceptacleGeometry) or receptacle_in_sight(
+                self.model, self.data, eye, goal
             ):
                 yield place
+
+
+def middle(goal: Goal) -> Point:
+    return goal.center[:2] if isinstance(goal, ReceptacleGeometry) else goal
