@@ -73,7 +73,8 @@ def scene_row(name: str, source: Path, models: tuple[Path, ...]) -> SceneRow:
         with tempfile.TemporaryDirectory() as folder:
             decisions, report = import_house(source, Path(folder) / "house", options)
     except AssetError as error:
-        return SceneRow(name, fault=f"refused: {brief(str(error).rpartition(': ')[2])}")
+        reason = str(error).replace(f"{source} ", "").rpartition(": ")[2]
+        return SceneRow(name, fault=f"refused: {brief(reason)}")
     near = [distance <= _CLOSE for distance in distances(source, options)]
     in_place, count = sum(near), len(near)
     outline = next(decision.choice for decision in decisions if decision.what == "outline")

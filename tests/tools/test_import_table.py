@@ -30,7 +30,7 @@ def test_a_refused_scene_is_a_row_with_its_reason(tmp_path):
     source = tmp_path / "empty.world"
     source.write_text("<sdf version='1.6'><world name='w'/></sdf>")
     row = scene_row("empty", source, ())
-    assert str(row).startswith("| empty |  |  |") and "no model with a shape" in str(row)
+    assert str(row).startswith("| empty |  |  |") and "refused: has no model with a shape" in str(row)
 
 
 @pytest.mark.slow

@@ -164,8 +164,9 @@ class _Export:
         bins = []
         for key, receptacle in self._scene.catalogue.receptacles.items():
             mount = self._data.site(f"mount:{key}")
-            yaw, position = math.atan2(mount.xmat[3], mount.xmat[0]), rounded(mount.xpos)
-            bins.append(MarkedBin(key, receptacle.room, receptacle.place, tuple(position), round(yaw, 6)))
+            yaw = round(math.atan2(mount.xmat[3], mount.xmat[0]), 6)
+            x, y, z = rounded(mount.xpos)
+            bins.append(MarkedBin(key, receptacle.room, receptacle.place, (x, y, z), yaw))
         return msgspec.to_builtins(HouseMarks([MarkedRoom(key, **room) for key, room in rooms], bins))
 
     def _rooms(self, glb: Glb) -> list[int]:

@@ -61,7 +61,7 @@ def read_marks(path: Path) -> HouseMarks:
     """Read the marks of a GLB or glTF file. Other files have none. Raise an AssetError if they are damaged."""
     try:
         extras = [node.extras for node in msgspec.json.decode(gltf_header(path), type=_Header).nodes]
-        found = next((e[MARKS] for e in extras if isinstance(e, dict) and MARKS in e), {})
+        found: Any = next((e[MARKS] for e in extras if isinstance(e, dict) and MARKS in e), {})
         marks = msgspec.convert(found, HouseMarks)
         marks.rooms()
     except ValueError as error:

@@ -70,7 +70,7 @@ def _material(material: Any, side: int | None) -> tuple[Floats, NDArray[np.float
 def is_opaque(mesh: trimesh.Trimesh) -> bool:
     """Return False for a translucent mesh, such as a painted shadow or a pane."""
     visual = mesh.visual
-    material = visual.material if visual.kind == "texture" else None
+    material: Any = visual.material if visual.kind == "texture" else None
     if getattr(material, "alphaMode", None) not in _TRANSLUCENT:
         return True
     opacity = 1.0 if material.baseColorFactor is None else float(material.baseColorFactor[3]) / 255

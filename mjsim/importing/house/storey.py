@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mjsim.formats.scene.source_scene import ImportDecision, ScenePiece, left_out
+from mjsim.formats.scene.source_scene import MAX_SIDE, ImportDecision, ScenePiece, left_out
 from mjsim.house.validation.object_rules import SIZE
 from mjsim.importing.house.solids import LOW
 from mjsim.values.errors import AssetError
@@ -16,18 +16,18 @@ _BIN, _STEP = 0.02, 0.3
 _UPWARD = 0.2  # share of level surfaces that must face up for the others to be ignored
 _FLAT = 0.95  # cosine of the maximum slope angle of a floor
 FAR = 200.0  # size above which a scene cannot be a house, in metres
-_MOST = 0.9  # minimum share of nearby pieces for distant pieces to be removed
+_MOST = 0.9  # minimum share of the names that have only nearby pieces, for distant pieces to be removed
 
 
 def near_pieces(pieces: Sequence[ScenePiece]) -> tuple[list[ScenePiece], list[ImportDecision]]:
     """Remove pieces that are far from most others, such as objects that fell through the floor."""
     middles = np.array([piece.surface.corners.mean(axis=(0, 1)) for piece in pieces])
-    near = np.abs(middles - np.median(middles, axis=0)).max(axis=1) < FAR
-    if near.all() or near.mean() < _MOST:
-        return list(pieces), []
+    near = np.abs(middles - np.median(middles, axis=0)).max(axis=1) < MAX_SIDE
     names = sorted({piece.name for piece, is_near in zip(pieces, near, strict=True) if not is_near})
+    if not names or len(names) > (1 - _MOST) * len({piece.name for piece in pieces}):
+        return list(pieces), []
     kept = [piece for piece, is_near in zip(pieces, near, strict=True) if is_near]
-    return kept, [left_out(", ".join(names[:6]), f"more than {FAR:g} m away")]
+    return kept, [left_out(", ".join(names[:6]), f"more than {MAX_SIDE:g} m away")]
 
 
 def floor_and_ceiling(pieces: Sequence[ScenePiece]) -> tuple[float, float]:

@@ -42,11 +42,9 @@ def imported(tmp_path, source, **options):
 
 
 def write_flat(folder):
-    """A flat, a part of which fell through the floor."""
-    lost = (
-        "<model name='lost'><pose>1 1 -7e8 0 0 0</pose><link name='l'><visual name='v'><geometry><box>"
-        "<size>1 1 1</size></box></geometry></visual></link></model>"
-    )
+    """Write a flat, a part of which was thrown far away."""
+    box = "<visual name='v'><geometry><box><size>1 1 1</size></box></geometry></visual>"
+    lost = f"<model name='lost'><pose>90 1 0.5 0 0 0</pose><link name='l'>{5 * box}</link></model>"
     return write_sdf(folder, extra=lost)
 
 
@@ -74,9 +72,9 @@ def test_a_door_between_rooms_stands_open(flat):
     assert compiled_house(catalogue).navigable.is_navigable((4.0, 2.5))
 
 
-def test_what_fell_through_the_floor_is_left_out(flat):
+def test_what_is_far_from_all_other_pieces_is_left_out(flat):
     decisions, _ = flat
-    assert decisions["left out"] == "lost: more than 200 m away"
+    assert decisions["left out"] == "lost: more than 60 m away"
 
 
 def test_loose_things_of_the_size_of_a_hand_are_left_out_and_named(flat):
