@@ -100,7 +100,7 @@ class ObservationLayout:
             blank["object_categories"][i, self.categories.index(placed.category)] = 1.0
         centers = {key: receptacle.center[:2] for key, receptacle in scene.receptacles.items()}
         constants = EpisodeConstants(
-            offsets=np.array([offset // 4 for _, offset in (self.vectors.fields or {}).values()]),
+            offsets=np.array([field[1] // 4 for field in (self.vectors.fields or {}).values()]),
             start=np.array([episode.start.x, episode.start.y, episode.start.heading]),
             bounds=np.array(self.floor.bounds),
             receptacles=np.array([centers[key] for key in self.receptacles]).reshape(-1, 2),
