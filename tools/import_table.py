@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from trimesh.transformations import compose_matrix
+from trimesh.transformations import compose_matrix, euler_from_matrix
 
 from mjsim.formats.scene.source_scene import HouseOptions
 from mjsim.formats.scene.surface import Floats
@@ -100,6 +100,7 @@ def distances(source: Path, options: HouseOptions) -> Iterator[float]:
         for model in state.findall("model"):
             if set((model.findtext("scale") or "1").split()) != {"1"}:
                 poses.pop(model.get("name", ""), None)
+            _move_links(world, model)
         world.remove(state)
     for model in (*world.findall("model"), *world.findall("include")):
         for pose in model.findall("pose"):
@@ -118,6 +119,27 @@ def distances(source: Path, options: HouseOptions) -> Iterator[float]:
             yield float(np.linalg.norm(moved - found[name], axis=1).max()) if same else np.inf
 
 
+def _move_links(world: ET.Element, saved: ET.Element) -> None:
+    """Give the links of a model, such as the lid of a chest, their saved poses relative to the model."""
+    model = next((m for m in world.findall("model") if m.get("name") == saved.get("name")), None)
+    if model is None:
+        return
+    for link in saved.findall("link"):
+        own = next((one for one in model.findall("link") if one.get("name") == link.get("name")), None)
+        if own is None:
+            continue
+        for pose in own.findall("pose"):
+            own.remove(pose)
+        relative = np.linalg.inv(_transform(saved)) @ _transform(link)
+        values = (*relative[:3, 3], *euler_from_matrix(relative))
+        ET.SubElement(own, "pose").text = " ".join(f"{value:.17g}" for value in values)
+
+
+def _transform(element: ET.Element) -> Floats:
+    pose = np.array((element.findtext("pose") or "0 0 0 0 0 0").split(), float)
+    return np.asarray(compose_matrix(translate=pose[:3], angles=pose[3:]))
+
+
 def _poses(parent: ET.Element) -> Iterator[tuple[str, Floats]]:
     """Yield name and pose of each model whose name is unique. Most includes without a name have that of their file."""
     elements = [*parent.findall("model"), *parent.findall("include")]
@@ -128,10 +150,8 @@ def _poses(parent: ET.Element) -> Iterator[tuple[str, Floats]]:
     ]
     counts = Counter(names)
     for element, name in zip(elements, names, strict=True):
-        if counts[name] > 1:
-            continue
-        pose = np.array((element.findtext("pose") or "0 0 0 0 0 0").split(), float)
-        yield name, compose_matrix(translate=pose[:3], angles=pose[3:])
+        if counts[name] == 1:
+            yield name, _transform(element)
 
 
 def _points(source: Path, options: HouseOptions) -> dict[str, Floats]:

@@ -9,19 +9,19 @@ from mjsim.formats.sdf_poses import SavedState
 from mjsim.support.toml import read_toml
 from tools.import_table import SCENES, distances, scene_row
 
-MOVED = "<state world_name='flat'><model name='sofa'><pose>3 4 0.3 0 0 1</pose></model></state>"
+MOVED = "<state world_name='flat'><model name='sofa'><pose>3 4 0.3 0 0 1</pose>"
+MOVED += "<link name='l'><pose>3.2 4 0.3 0.2 0 1.5</pose></link></model></state>"
 
 
 def test_models_are_where_the_source_places_them(tmp_path):
     found = list(distances(write_sdf(tmp_path, extra=MOVED), HouseOptions()))
-    assert (
-        len(found) == 10
-    )  # floor, six walls, door, sofa and cup; the included table has no name in the world
+    assert len(found) == 11  # floor, six walls, door, sofa, cup and the included table
     np.testing.assert_allclose(found, 0, atol=1e-9)
 
 
 def test_a_model_elsewhere_is_found(tmp_path, monkeypatch):
-    monkeypatch.setattr(SavedState, "model_frame", lambda _, own: own)  # as if the state had no poses
+    for name in ("model_frame", "link_frame"):  # as if the state had no poses
+        monkeypatch.setattr(SavedState, name, lambda *arguments: arguments[-1])
     found = list(distances(write_sdf(tmp_path, extra=MOVED), HouseOptions()))
     assert [distance > 3 for distance in found].count(True) == 1
 

@@ -110,9 +110,8 @@ def check_mesh_file(path: Path, suffixes: tuple[str, ...] = OBJECT_SUFFIXES) -> 
 def gltf_header(path: Path) -> bytes:
     """Return the JSON text of a glTF or GLB file."""
     with path.open("rb") as file:
-        start = file.read(
-            20
-        )  # of a GLB file: magic number, version, length; length and type of the JSON text
+        # A GLB file begins with its magic number, version and length, and the length and type of the JSON text.
+        start = file.read(20)
         binary = start.startswith(b"glTF")
         return file.read(int.from_bytes(start[12:16], "little")) if binary else start + file.read()
 
