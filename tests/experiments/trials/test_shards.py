@@ -179,8 +179,9 @@ def test_shards_with_packed_trials_merge_into_what_one_machine_makes(whole, tmp_
 def test_a_trial_that_ended_early_is_replaced_by_a_complete_one(whole, tmp_path):
     early = shutil.copytree(whole, tmp_path / "out", ignore=shutil.ignore_patterns(".rows*"))
     path = next((early / "trials").iterdir())
-    events = (path / records.EVENTS).read_text()
-    (path / records.EVENTS).write_text(events.replace('"reason": "time limit"', '"reason": "interrupted"'))
+    for name in (records.EVENTS, records.METRICS):
+        text = (path / name).read_text()
+        (path / name).write_text(text.replace('"time limit"', '"interrupted"'))
     write_checksums(path, records.FILES)
     assert not read_trial(path).complete
     merged = merge_shards(DESIGN, early, [whole])

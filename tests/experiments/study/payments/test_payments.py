@@ -12,7 +12,7 @@ from experiments.study.payments.rules import decide, due
 from experiments.trials.designs import FOLDER
 from experiments.visit.store import Store
 
-PAY = Pay(currency="EUR", reward=7.5, screen_out=0.505, bonus_for_all=1.0, partial=True)
+PAY = Pay(currency="EUR", reward=7.5, screen_out=0.51, bonus_for_all=1.0, partial=True)
 
 
 def with_pay(pay):

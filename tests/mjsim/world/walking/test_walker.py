@@ -105,7 +105,7 @@ class House:
 
     def __init__(self):
         self.asked = 0
-        self.geodesics = self.navmesh = self
+        self.geodesics = self.navmesh = self.standing = self
 
     def shortest_path(self, start, goal):
         self.asked += 1
@@ -113,6 +113,11 @@ class House:
 
     def snap(self, position):
         return position
+
+    place_of = snap
+
+    def suits(self, stand, goal):
+        return True
 
 
 def percept(observation, *, refused=False, blocked=False):
