@@ -42,8 +42,7 @@ def shared(a, b):
 def check_shapes(page):
     """Lists leave the view free, buttons the clock, and all text can be read."""
     for name, (width, height) in SHAPES.items():
-        page.set_viewport_size({"width": width, "height": height})
-        page.wait_for_timeout(500)
+        resize(page, width, height)
         at = page.evaluate(RECTS, ["view", "tasks", "side", "clock", "progress", "room", "tools"])
         view = at["view"]
         covered = sum(shared(view, at[part]) for part in ("tasks", "side"))
@@ -51,6 +50,14 @@ def check_shapes(page):
         assert covered <= limit * shared(view, view) + 1.0, name
         assert not any(shared(at["tools"], at[part]) for part in ("clock", "progress", "room")), name
         assert page.evaluate(SMALLEST) >= 12.0, name
+
+
+def resize(page, width, height):
+    """Resize the window, and wait until the page has its layout, which takes seconds while a busy machine draws."""
+    page.set_viewport_size({"width": width, "height": height})
+    page.wait_for_function("size => innerWidth === size[0] && innerHeight === size[1]", arg=[width, height])
+    page.wait_for_timeout(500)
+    page.evaluate("() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
 
 
 def within(page, selector):
@@ -84,15 +91,14 @@ def label_at(page, x):
 def check_sizes(page):
     """Nothing is cut off in small windows, and text and map grow with the window."""
     for name, (width, height) in SMALL.items():
-        page.set_viewport_size({"width": width, "height": height})
-        page.wait_for_timeout(500)
+        resize(page, width, height)
+        page.evaluate("document.getElementById('redraw-button').hidden = false")  # as after a change of drawing
         assert within(page, "#tools button, #map, #hands li"), name
         for x in (0.0, 0.1, 0.5, 1.0):
             left, right, view_left, view_right = label_at(page, x)
             assert view_left <= left + 0.5 and right <= view_right + 0.5, (name, x)
     for name, (width, height, font, least) in SCALED.items():
-        page.set_viewport_size({"width": width, "height": height})
-        page.wait_for_timeout(500)
+        resize(page, width, height)
         size = page.evaluate("parseFloat(getComputedStyle(document.getElementById('list')).fontSize)")
         left, _, right, _ = page.evaluate(RECTS, ["map"])["map"]
         assert font <= size <= 20.0 and right - left >= least, name
