@@ -92,7 +92,9 @@ def check_sizes(page):
     """Nothing is cut off in small windows, and text and map grow with the window."""
     for name, (width, height) in SMALL.items():
         resize(page, width, height)
-        page.evaluate("document.getElementById('redraw-button').hidden = false")  # as after a change of drawing
+        page.evaluate(
+            "document.getElementById('redraw-button').hidden = false"
+        )  # as after a change of drawing
         assert within(page, "#tools button, #map, #hands li"), name
         for x in (0.0, 0.1, 0.5, 1.0):
             left, right, view_left, view_right = label_at(page, x)
