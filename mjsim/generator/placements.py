@@ -1,4 +1,4 @@
-"""Describe the result of furnishing: where furniture and bins stand, and where objects can lie on furniture."""
+"""Convert furnished rooms to the placements of furniture, and find the places on it where objects can lie."""
 
 import math
 from collections.abc import Sequence

@@ -47,7 +47,7 @@ Test = FTest | WaldTest | Chi2Test
 
 @dataclass(frozen=True)
 class AnalysisResult:
-    """The result of a test or model, or the reason why there is none. If `objects` is None, all trials were used."""
+    """The result of a test or model, or the reason for its absence. If `objects` is None, all trials were used."""
 
     measure: str
     kind: str

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from mjsim.environments.episodes import CompiledEpisode
 from mjsim.environments.sensors.vector_kernels import (
     EpisodeConstants,
-    Obstacles,
-    Snapshot,
+    ObservedState,
+    ObstacleEdges,
     compute_vectors,
     vector_shapes,
 )
@@ -83,10 +83,10 @@ class ObservationLayout:
         return np.dtype([(name, np.float32, shape) for name, shape in shapes.items()])
 
     @cached_property
-    def obstacles(self) -> Obstacles:
+    def obstacles(self) -> ObstacleEdges:
         outlines = self.floor.obstacles
         sides = [np.hstack([outline, np.roll(outline, -1, axis=0) - outline]) for outline in outlines]
-        return Obstacles(
+        return ObstacleEdges(
             edges=np.vstack([np.zeros((0, 4)), *sides]),
             first=np.cumsum([0, *map(len, outlines)]),
             circles=np.array([_circle_around(outline) for outline in outlines]).reshape(-1, 3),
@@ -111,13 +111,13 @@ class ObservationLayout:
             time_limit=float(self.time_limit),
         )
         constant_vectors = np.ndarray(blank.nbytes // 4, np.float32, blank)
-        compute = specialized(compute_vectors, Snapshot.example(), constants, constant_vectors)
+        compute = specialized(compute_vectors, ObservedState.example(), constants, constant_vectors)
 
         def vectors(state: Observation) -> NDArray[np.void]:
             names, (left, right), values = state.object_names, state.hands, constant_vectors.copy()
             hands = -1 if left is None else names.index(left), -1 if right is None else names.index(right)
             statuses = np.array([_STATUSES.index(status) for status in state.object_status])
-            snapshot = Snapshot(
+            snapshot = ObservedState(
                 state.time, state.position, state.heading, state.pitch, state.velocity, hands, state.busy,
                 state.object_positions, state.object_quaternions, statuses,
             )  # fmt: skip

@@ -47,7 +47,7 @@ def vector_shapes(slots: int, categories: int, receptacles: int) -> dict[str, tu
     }
 
 
-class Obstacles(NamedTuple):
+class ObstacleEdges(NamedTuple):
     """The outlines of the obstacles on a floor, in metres."""
 
     edges: (
@@ -65,13 +65,13 @@ class EpisodeConstants(NamedTuple):
     bounds: Floats  # extent of the rooms: xmin, ymin, xmax, ymax
     receptacles: Floats  # centres of the receptacles, shape (r, 2)
     bins: Floats  # centre of each object's receptacle, shape (n, 2)
-    obstacles: Obstacles
+    obstacles: ObstacleEdges
     scale: float  # length by which offsets are divided
     max_speed: float
     time_limit: float
 
 
-class Snapshot(NamedTuple):
+class ObservedState(NamedTuple):
     """The state of the person and the objects. See `Observation` for the units."""
 
     time: float
@@ -86,14 +86,14 @@ class Snapshot(NamedTuple):
     object_status: Ints  # index of each object's status in `ObjectStatus`, shape (n,)
 
     @classmethod
-    def example(cls) -> "Snapshot":
+    def example(cls) -> "ObservedState":
         """Return a snapshot with strided arrays. Code that is compiled for it also accepts contiguous arrays."""
         pair, rows, statuses = np.zeros(4)[::2], np.zeros((1, 8))[:, ::2], np.zeros(2, np.int64)[::2]
         return cls(0.0, pair, 0.0, 0.0, pair, (-1, -1), False, rows, rows, statuses)
 
 
 @kernel
-def compute_vectors(now: Snapshot, episode: EpisodeConstants, values: Vector) -> None:
+def compute_vectors(now: ObservedState, episode: EpisodeConstants, values: Vector) -> None:
     """Store the vectors of an observation in `values`, which contains zeros and the constant vectors."""
     _observe_person(now, episode, values)
     _observe_objects(now, episode, values)
@@ -106,7 +106,7 @@ def compute_vectors(now: Snapshot, episode: EpisodeConstants, values: Vector) ->
 
 
 @kernel
-def _observe_person(now: Snapshot, episode: EpisodeConstants, values: Vector) -> None:
+def _observe_person(now: ObservedState, episode: EpisodeConstants, values: Vector) -> None:
     offsets, start, bounds = episode.offsets, episode.start, episode.bounds
     gps, compass, pose, motion = offsets[GPS], offsets[COMPASS], offsets[POSE], offsets[MOTION]
     x, y = now.position[0] - start[0], now.position[1] - start[1]
@@ -126,7 +126,7 @@ def _observe_person(now: Snapshot, episode: EpisodeConstants, values: Vector) ->
 
 
 @kernel
-def _observe_objects(now: Snapshot, episode: EpisodeConstants, values: Vector) -> None:
+def _observe_objects(now: ObservedState, episode: EpisodeConstants, values: Vector) -> None:
     offsets, undelivered = episode.offsets, 0
     for i, status in enumerate(now.object_status):
         position, q = now.object_positions[i], now.object_quaternions[i]
@@ -149,7 +149,7 @@ def _observe_objects(now: Snapshot, episode: EpisodeConstants, values: Vector) -
 
 
 @kernel
-def _find_ranges(x: float, y: float, heading: float, obstacles: Obstacles, out: Vector) -> None:
+def _find_ranges(x: float, y: float, heading: float, obstacles: ObstacleEdges, out: Vector) -> None:
     """Store obstacle distances along rays from (x, y), counter-clockwise from `heading`, as shares of `RANGE`."""
     forward_x, forward_y, distances = np.empty(RAYS), np.empty(RAYS), np.full(RAYS, RANGE)
     for r in range(RAYS):

@@ -189,7 +189,7 @@ class CompiledHouse:
         return self.cached((path, False), lambda: remove_visuals(whole.copy()))
 
     def cached(self, key: Any, compute: Callable[[], T]) -> T:
-        """Return the value cached under `key`. If there is none, compute it with `compute`."""
+        """Return the value cached under `key`. Call `compute` on the first use."""
         if key not in self._derived:
             self._derived[key] = compute()
         return cast(T, self._derived[key])

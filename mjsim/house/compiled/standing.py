@@ -19,7 +19,8 @@ Goal = Point | ReceptacleGeometry
 """A receptacle, or the floor position of an object in metres, shape (2,)."""
 
 REACH_HEIGHT = 1.15  # height at which a hand passes over furniture, in metres
-SHOULDERS, HANDS = 0.15, 0.05  # half widths of a reach at the person and at its end, in metres
+# Half widths of the free space that an arm needs, at the body and at the goal, in metres
+SHOULDERS, HANDS = 0.15, 0.05
 DOORWAY_WIDTH = 1.2  # maximum distance between the two sides of a doorway, in metres
 DOORWAY_DEPTH = 0.2  # maximum distance between a person in a doorway and the wall around it, in metres
 DISTANCES = (0.72, 0.56)  # distances of candidate places from a goal, relative to the reach

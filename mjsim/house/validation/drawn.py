@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DrawnFault:
-    """Two drawn geoms that overlap, or that have faces in the same place."""
+    """A pair of drawn geoms that overlap, or that flicker because they have faces in the same place."""
 
     first: int  # id of the first geom
     second: int
@@ -82,7 +82,7 @@ def coplanar_faces(compiled: Compiled) -> list[DrawnFault]:
 
 
 def describe(compiled: Compiled, faults: Sequence[DrawnFault], scale: float, unit: str) -> str:
-    """Summarize faults for a report: their number, and the largest with the names of its bodies."""
+    """Return the number of faults, the largest amount and the names of its bodies, as text for a report."""
     if not faults:
         return "none"
     worst = max(faults, key=lambda fault: fault.amount)

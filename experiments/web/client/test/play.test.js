@@ -214,7 +214,7 @@ describe("while the clock runs", () => {
   test("the display quality is reported, and shown with ?debug", async () => {
     history.replaceState({}, "", "/play/token?debug");
     await running();
-    for (let number = 2; number < 32; number++) { // then the participant stands still for 4 s
+    for (let number = 2; number < 32; number++) { // then the participant does not move for 4 s
       vi.advanceTimersByTime(33);
       socket().onmessage({ data: frame({ number }) });
       await settled();
