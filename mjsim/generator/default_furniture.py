@@ -86,7 +86,7 @@ FALLBACKS: Options = ("standing_mirror", "umbrella_stand", "snake_plant", "stool
 MAX_PLANTS = 2  # maximum number of plants per room
 _RARE = ("aquarium", "piano", "stove", "larder", "dresser", "kitchen_trolley", "cactus")
 _SCARCE = ("bush", "tree", "palm", "fern_stand", "snake_plant", "pouf", "television")
-# Maximum number of pieces per home; the default is no limit.
+# Maximum number of pieces of a kind per home. Other kinds have no limit.
 MAX_IN_HOME = dict.fromkeys(_RARE, 1) | dict.fromkeys(_SCARCE, 2)
 ROUNDS = 3  # number of passes through the lists of default furniture
 MAX_OF_KIND = {
