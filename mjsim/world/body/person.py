@@ -16,6 +16,7 @@ from mjsim.values.actions import Move
 from mjsim.values.motion_parameters import MotionParameters
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
+from mjsim.world.body.falls import FallDetector
 from mjsim.world.body.grips import Grips
 from mjsim.world.body.motion_profiles import change_pitch, change_turn_rate, change_velocity, point_between
 from mjsim.world.body.postures import move_hand, posture_pace
@@ -24,6 +25,8 @@ from mjsim.world.body.rig import Rig
 # A motion is a generator that sets the servos, yields once per control step, and returns True on success.
 Motion = Generator[None, None, bool]
 Steps = Generator[None, None, None]
+
+FALL_DIVISION = 8  # number of parts into which each physics step is divided while an object falls
 
 
 @dataclass(eq=False)
@@ -41,10 +44,12 @@ class Person:
     hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
     moving_hand: int | None = None  # index of the hand with a motion, or None
     receptacle_heights: ReceptacleHeights = field(init=False)
+    falls: FallDetector = field(init=False)
     posture_pace: NDArray[np.float64] = field(init=False)  # see `Hands.pace` in `mjsim.world.body.postures`
 
     def __post_init__(self) -> None:
         self.receptacle_heights = ReceptacleHeights(self.scene)
+        self.falls = FallDetector(self.scene.model, self.data, self.scene.index)
         p = self.parameters
         limits = (
             p.fastest_walk,
@@ -67,6 +72,10 @@ class Person:
     @property
     def dt(self) -> float:
         return self.options.control_timestep
+
+    def advance(self) -> None:
+        """Simulate one control step, with shorter physics steps while an object falls."""
+        self.rig.advance(FALL_DIVISION if self.falls.falls(self.grips.gripped) else 1)
 
     def steps(self, seconds: float) -> int:
         """Convert a duration in seconds to a number of control steps, at least 1."""

@@ -149,13 +149,31 @@ class Rig:
         c, s = math.cos(heading), math.sin(heading)
         return math.atan2(c * dy - s * dx, c * dx + s * dy)
 
-    def advance(self) -> None:
-        """Simulate one control step, during which the servos ramp from the previous to the new commands."""
+    def advance(self, division: int = 1) -> None:
+        """Simulate one control step, during which the servos ramp from the previous to the new commands.
+
+        Each physics step is divided into `division` steps. The contacts of objects and the house then become stiffer,
+        because their time constant is the shortest one that is stable.
+        """
         ramp_servos(
             self.pose, self.motion, self.hand_targets, self._last_hand_targets, self._last_command,
             self._activations, self._controls, self._dt,
         )  # fmt: skip
-        mujoco.mj_step(self.model, self.data, self._substeps)
+        if division == 1:
+            mujoco.mj_step(self.model, self.data, self._substeps)
+            return
+        model, option = self.model, self.model.opt
+        before = option.timestep, option.sleep_tolerance, model.geom_solref[:, 0].copy()
+        divided = (model.geom_priority == 0) & (before[2] > 0.0)  # not the person's geoms
+        try:
+            option.timestep /= division
+            option.sleep_tolerance /= (
+                division  # otherwise, an object could fall asleep while it changes direction
+            )
+            model.geom_solref[divided, 0] /= division
+            mujoco.mj_step(model, self.data, self._substeps * division)
+        finally:
+            option.timestep, option.sleep_tolerance, model.geom_solref[:, 0] = before
 
 
 @kernel

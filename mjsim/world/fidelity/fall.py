@@ -63,7 +63,7 @@ def drop(full: Full, kinematic: KinematicWorld, hand: int, item: int, receptacle
 
 def _advance(full: Full, held: Sequence[int | None]) -> list[tuple[EventKind, int]]:
     if not full.is_settled:
-        full.person.rig.advance()
+        full.person.advance()
     events = list(full.monitor.check(held))
     return events + [(EventKind.DISLODGED, item) for item in full.dislodged()]
 

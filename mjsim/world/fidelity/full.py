@@ -163,7 +163,7 @@ class Full(Tier):
         else:
             self._run_motion(self._motion)
         self.carrying.update(self._held_posture())
-        self.person.rig.advance()
+        self.person.advance()
         for kind, item in self.monitor.check(self.person.held):
             self.episode_state.report(self.time, kind, item)
         self._release_slipped()

@@ -1,0 +1,53 @@
+"""Falls: an object that falls from a hand does not sink into the floor, and its fall is the same each time."""
+
+from contextlib import contextmanager
+
+import mujoco
+import numpy as np
+from small_worlds import scene_of, world_of
+
+from mjsim.values.actions import IDLE
+
+MODELS = ("jeans", "magazine", "t_shirt", "bottle", "plate", "towel", "newspaper", "comics")
+HEIGHT = 1.3  # of the carrying posture, m
+DEEPEST = 0.010  # m
+
+
+@contextmanager
+def deepest_contacts():
+    """Depth of the deepest contact in each physics step, m."""
+    found = []
+    mujoco.set_mjcb_passive(
+        lambda _, data: found.append(max(0.0, -float(data.contact.dist.min(initial=0.0))))
+    )
+    try:
+        yield found
+    finally:
+        mujoco.set_mjcb_passive(None)
+
+
+def _drop(world, rng):
+    """Let all objects fall from random poses that are nearly upright, as in a hand, or anyhow."""
+    world.reset()
+    index, data = world.scene.index, world.data
+    for item, (qpos, dof) in enumerate(zip(index.qpos, index.dofs, strict=True)):
+        turn = rng.normal(size=4) * ((1.0, 0.15, 0.15, 1.0) if item % 2 else 1.0)
+        data.qpos[qpos + 2] = HEIGHT + 0.1 * rng.random()
+        data.qpos[qpos + 3 : qpos + 7] = turn / np.linalg.norm(turn)
+        data.qvel[dof : dof + 6] = rng.normal(size=6) * (0.4, 0.4, 0.0, 1.0, 1.0, 1.0)
+        data.tree_asleep[index.trees[item]] = -11
+    for _ in range(25):
+        world.step(IDLE)
+
+
+def test_a_dropped_object_sinks_in_less_than_a_centimetre(catalogue, navmesh):
+    rng = np.random.default_rng(8)
+    places = [(model, *navmesh.sample(rng)) for model in MODELS]
+    world = world_of(scene_of(catalogue, (*navmesh.sample(rng), 0.0), *places, height=0.01))
+    timestep, softness = world.model.opt.timestep, world.model.geom_solref.copy()
+    with deepest_contacts() as depths:
+        for _ in range(2):
+            _drop(world, rng)
+    assert 0.001 < max(depths) < DEEPEST
+    assert world.model.opt.timestep == timestep
+    assert np.array_equal(world.model.geom_solref, softness)
