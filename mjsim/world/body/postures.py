@@ -84,7 +84,8 @@ def update_hands(
         goal[2] = max(holding.posture[2], carrying.least_height + height)
     if holding.left >= 0 and holding.right >= 0 and holding.moving < 0:
         loads, left, right = hands.loads, holding.left, holding.right
-        _raise_right(hands.goals, loads[left, 0] + loads[right, 0], loads[right, 1], carrying)
+        radii, height = loads[left, 0] + loads[right, 0], loads[right, 1]
+        _raise_right(hands.goals, hands.targets, radii, height, carrying)
     for hand in range(2):
         if hand != holding.moving:
             goal = hands.goals[hand]
@@ -118,8 +119,12 @@ def move_hand(
 
 
 @kernel
-def _raise_right(goals: Floats, radii: float, height: float, carrying: CarryingParameters) -> None:
+def _raise_right(
+    goals: Floats, targets: Floats, radii: float, height: float, carrying: CarryingParameters
+) -> None:
+    """Raise the right load above the left one where they would overlap, at the goals or on the way to them."""
     apart = math.hypot(goals[1, 0] - goals[0, 0], goals[1, 1] - goals[0, 1])
+    apart = min(apart, math.hypot(targets[1, 0] - targets[0, 0], targets[1, 1] - targets[0, 1]))
     near = (radii + carrying.stacking_distance - apart) / carrying.stacking_distance
     over = goals[0, 2] + height + carrying.stacking_gap - goals[1, 2]
     goals[1, 2] += min(1.0, max(0.0, near)) * max(0.0, over)
