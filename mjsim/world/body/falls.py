@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 class FallDetector:
-    """A detector that finds out if an object falls or tumbles."""
+    """A detector of falling or tumbling objects."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, index: SceneIndex) -> None:
         geoms = np.flatnonzero((index.geom_owner >= 0) & ((model.geom_contype | model.geom_conaffinity) > 0))
@@ -28,7 +28,7 @@ class FallDetector:
         np.maximum.at(radii, index.geom_owner[geoms], extents)
         self._arrays = (data.qvel, data.xmat, index.dofs, index.bodies, radii)
 
-    def falls(self, gripped: tuple[int, ...]) -> bool:
+    def detects(self, gripped: tuple[int, ...]) -> bool:
         """Return True if an object that is not `gripped` falls or tumbles fast."""
         first, second = (*gripped, -1, -1)[:2]
         return bool(_falls(self._arrays, first, second))
@@ -36,15 +36,12 @@ class FallDetector:
 
 @kernel
 def _falls(arrays: Any, first: int, second: int) -> bool:
-    """Return True if an object falls or tumbles fast, other than the `first` and `second`."""
     qvel, xmat, dofs, bodies, radii = arrays
     for item in range(len(dofs)):
         dof = dofs[item]
         square = upright = 0.0
-        for axis in range(3):
-            rate = qvel[
-                dof + 3 + axis
-            ]  # in the frame of the body, whose upward direction is in the third row
+        for axis in range(3):  # of the body's frame, in which the third row of `xmat` points up
+            rate = qvel[dof + 3 + axis]
             square += rate * rate
             upright += rate * xmat[bodies[item], 6 + axis]
         tumbling = math.sqrt(max(0.0, square - upright * upright))

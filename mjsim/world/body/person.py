@@ -44,12 +44,12 @@ class Person:
     hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
     moving_hand: int | None = None  # index of the hand with a motion, or None
     receptacle_heights: ReceptacleHeights = field(init=False)
-    falls: FallDetector = field(init=False)
+    fall_detector: FallDetector = field(init=False)
     posture_pace: NDArray[np.float64] = field(init=False)  # see `Hands.pace` in `mjsim.world.body.postures`
 
     def __post_init__(self) -> None:
         self.receptacle_heights = ReceptacleHeights(self.scene)
-        self.falls = FallDetector(self.scene.model, self.data, self.scene.index)
+        self.fall_detector = FallDetector(self.scene.model, self.data, self.scene.index)
         p = self.parameters
         limits = (
             p.fastest_walk,
@@ -75,7 +75,7 @@ class Person:
 
     def advance(self) -> None:
         """Simulate one control step, with shorter physics steps while an object falls."""
-        self.rig.advance(FALL_DIVISION if self.falls.falls(self.grips.gripped) else 1)
+        self.rig.advance(FALL_DIVISION if self.fall_detector.detects(self.grips.gripped) else 1)
 
     def steps(self, seconds: float) -> int:
         """Convert a duration in seconds to a number of control steps, at least 1."""

@@ -84,8 +84,8 @@ def update_hands(
         goal[2] = max(holding.posture[2], carrying.least_height + height)
     if holding.left >= 0 and holding.right >= 0 and holding.moving < 0:
         loads, left, right = hands.loads, holding.left, holding.right
-        radii, height = loads[left, 0] + loads[right, 0], loads[right, 1]
-        _raise_right(hands.goals, hands.targets, radii, height, carrying)
+        radii = loads[left, 0] + loads[right, 0]
+        _raise_right(hands.goals, hands.targets, radii, loads[right, 1], carrying)
     for hand in range(2):
         if hand != holding.moving:
             goal = hands.goals[hand]

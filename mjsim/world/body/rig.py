@@ -152,8 +152,7 @@ class Rig:
     def advance(self, division: int = 1) -> None:
         """Simulate one control step, during which the servos ramp from the previous to the new commands.
 
-        Each physics step is divided into `division` steps. The contacts of objects and the house then become stiffer,
-        because their time constant is the shortest one that is stable.
+        Physics steps are divided into `division` steps. The time constants of objects' contacts shrink with them.
         """
         ramp_servos(
             self.pose, self.motion, self.hand_targets, self._last_hand_targets, self._last_command,
@@ -167,9 +166,8 @@ class Rig:
         divided = (model.geom_priority == 0) & (before[2] > 0.0)  # not the person's geoms
         try:
             option.timestep /= division
-            option.sleep_tolerance /= (
-                division  # otherwise, an object could fall asleep while it changes direction
-            )
+            # Otherwise, an object could fall asleep in the air while it changes direction.
+            option.sleep_tolerance /= division
             model.geom_solref[divided, 0] /= division
             mujoco.mj_step(model, self.data, self._substeps * division)
         finally:
