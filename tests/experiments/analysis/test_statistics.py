@@ -251,14 +251,19 @@ def test_welchs_effect_size_lies_in_its_interval():
     assert brown_forsythe(groups()).as_json()["of"] == "variance of the distances from the medians"
 
 
+@pytest.mark.parametrize("with_age", [False, True])
 @pytest.mark.parametrize("spread", [0.8, 0.15, 0.0])
-def test_the_mixed_model_by_dense_matrices(spread):
+def test_the_mixed_model_by_dense_matrices(spread, with_age):
     """The likelihood at its maximum and Fai and Cornelius' F, written out with the covariance of all people."""
     rng = np.random.default_rng(int(100 * spread))
     house, first, second = rng.integers(0, 8, 90), rng.choice([*"abc"], 90), rng.choice([6, 12], 90)
     y = rng.normal(size=90) + rng.normal(0, spread, 8)[house] + 0.5 * (first == "c")
     cells = cells_of(y, first, second)
     columns = [block[cells.member] for block in cells.columns.values()]
+    age = rng.normal(40.0, 9.0, 90)
+    if with_age:
+        scores = ((age - np.mean(age)) / np.std(age)).reshape(90, 1)
+        columns += [scores, scores * cells.columns["assistance"][cells.member]]
     x, z, eye = np.hstack(columns), 1.0 * (house[:, None] == np.arange(8)), np.eye(90)
     parts = np.array([z @ z.T, eye])
 
@@ -267,7 +272,9 @@ def test_the_mixed_model_by_dense_matrices(spread):
         covariance = np.linalg.inv(x.T @ inverse @ x)
         return inverse - inverse @ x @ covariance @ x.T @ inverse, covariance, inverse
 
-    model = mixed_model(y, first, second, {"house": house})
+    model = mixed_model(y, first, second, {"house": house}, ("age", age) if with_age else None)
+    assert list(model.tests)[3:] == ["age", "age x assistance"] * with_age
+    assert (model.random["house"].interval is None) is with_age
     variances = np.array([model.random["house"].variance, model.residual_variance])
     p, covariance, inverse = projection(variances)
     slopes = [np.trace(p @ v) - y @ p @ v @ p @ y for v in parts]
@@ -277,7 +284,9 @@ def test_the_mixed_model_by_dense_matrices(spread):
         [y @ p @ v @ p @ w @ p @ y - np.trace(p @ v @ p @ w) / 2 for w in parts] for v in parts
     ]
     of_variances = (
-        np.linalg.inv(second_derivatives) if variances[0] else np.diag([0, 2 * variances[1] ** 2 / 84])
+        np.linalg.inv(second_derivatives)
+        if variances[0]
+        else np.diag([0, 2 * variances[1] ** 2 / (90 - x.shape[1])])
     )
     effects, start = covariance @ x.T @ inverse @ y, 1
     for test, block in zip(model.tests.values(), columns[1:], strict=True):
