@@ -137,9 +137,7 @@ class Researchers:
         return None if row is None else Researcher(*row)
 
     @transaction
-    async def log_out(
-        self, connection: Connection, token_hash: str, now: datetime | None = None
-    ) -> None:
+    async def log_out(self, connection: Connection, token_hash: str, now: datetime | None = None) -> None:
         mine = (login.c.token_hash == token_hash, login.c.revoked.is_(None))
         await connection.execute(update(login).where(*mine).values(revoked=now or utc_now()))
 
