@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from experiments.analysis.study.measures import LIKERT_PREFIX, Survey
+from experiments.analysis.study.measures import LIKERT_PREFIX, SurveyScale
 from experiments.analysis.study.measures import SURVEY as SURVEY_FILE
 from experiments.errors import ConfigError, RecordError
 from experiments.record.files import write_json
@@ -55,7 +55,7 @@ class Collected:
     texts: Sequence[tuple[str, str, str]]
     unfinished: Mapping[str, int]
     unusable: Mapping[str, str]
-    survey: Survey | None = None
+    survey: SurveyScale | None = None
 
 
 async def collect(study: Study, store: Store, folder: Path) -> Collected:
@@ -89,10 +89,10 @@ def _processes() -> int:
     return os.cpu_count() or 1
 
 
-def survey_of(study: Study) -> Survey:
+def survey_of(study: Study) -> SurveyScale:
     """Return the scale of a study's survey, and the items that are answered on it."""
     section = study.texts[SURVEY]
-    return Survey(
+    return SurveyScale(
         len(section.scale), {item.name: item.text for item in section.items if item.kind == "scale"}
     )
 
