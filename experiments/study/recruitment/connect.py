@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from experiments.study.file import Recruitment
-from experiments.study.payments.platform import LISTED_AFTER, TIMEOUT, Api, Order, secret
+from experiments.study.payments.platform import LISTED_AFTER, Api, Order, secret
 from experiments.visit.recruiter import Candidate, InvalidLink, Leaving, WayBack
 
 PERSON, ASSIGNMENT, PROJECT = "participantId", "assignmentId", "projectId"
@@ -51,10 +51,10 @@ class ConnectPayer:
     listed_after = LISTED_AFTER
     shortest_reason = 1
 
-    def __init__(self, settings: Recruitment, timeout: float = TIMEOUT) -> None:
+    def __init__(self, settings: Recruitment) -> None:
         headers = {"X-API-KEY": secret(KEY)}
         url = f"{settings.api_url or API}/api/v1"
-        self._api = Api(url, headers, timeout)
+        self._api = Api(url, headers)
 
     async def find(self, order: Order) -> str | None:
         """Look for a payment in the status of the assignment or in the sum of its bonuses."""

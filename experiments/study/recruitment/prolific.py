@@ -7,7 +7,7 @@ from typing import Any
 from urllib.parse import urlencode
 
 from experiments.study.file import Recruitment
-from experiments.study.payments.platform import TIMEOUT, Api, DeclinedError, Order, UnsureError, secret
+from experiments.study.payments.platform import Api, DeclinedError, Order, UnsureError, secret
 from experiments.visit.recruiter import Candidate, InvalidLink, Leaving, WayBack
 
 PERSON, STUDY, SUBMISSION = "PROLIFIC_PID", "STUDY_ID", "SESSION_ID"
@@ -60,10 +60,10 @@ class ProlificPayer:
     listed_after = timedelta(hours=1)
     shortest_reason = 100
 
-    def __init__(self, settings: Recruitment, timeout: float = TIMEOUT) -> None:
+    def __init__(self, settings: Recruitment) -> None:
         headers = {"Authorization": f"Token {secret(TOKEN)}"}
         url = f"{settings.api_url or API}/api/v1"
-        self._api = Api(url, headers, timeout)
+        self._api = Api(url, headers)
         self._screened_out = settings.screened_out
 
     async def find(self, order: Order) -> str | None:
