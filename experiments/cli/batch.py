@@ -84,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
     design = _design(arguments)
     if (code := run_share(design, arguments, "trials")) is not None:
         return code
-    rows, failed = run_with_progress(design, arguments, "trials")
+    rows, failed = run_with_progress(design, arguments.out, arguments, "trials")
     error_console().print(
         f"{counted(len(rows), 'trial')} in {arguments.out}/trials.parquet and .csv; {failed} failed"
     )

@@ -46,7 +46,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def run_with_progress(
-    design: Design, arguments: argparse.Namespace, what: str
+    design: Design, out: Path, arguments: argparse.Namespace, what: str, shard: Shard | None = None
 ) -> tuple[list[Mapping[str, Any]], int]:
     """Run all unfinished trials of a design or shard. Return the rows of all trials and the number of failures."""
     from experiments.trials.batch import BatchProgress, run_batch
@@ -67,11 +67,11 @@ def run_with_progress(
 
         rows = run_batch(
             design,
-            arguments.out,
+            out,
             workers=arguments.workers,
             executor=arguments.executor,
             packed=arguments.packed,
-            shard=arguments.shard,
+            shard=shard,
             on_progress=show,
             on_note=note,
             on_read=show_reading,
@@ -127,7 +127,7 @@ def run_share(design: Design, arguments: argparse.Namespace, what: str) -> int |
         return _merge(design, out, arguments.merge, arguments.workers)
     if arguments.shard is None:
         return None
-    rows, failed = run_with_progress(design, arguments, what)
+    rows, failed = run_with_progress(design, out, arguments, what, arguments.shard)
     error_console().print(
         f"shard {arguments.shard}: {counted(len(rows), 'trial')} in {out}; {failed} failed; --merge writes the tables"
     )
