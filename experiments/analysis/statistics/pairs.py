@@ -82,9 +82,8 @@ def _equivalence_p(groups: Mapping[str, Values], pair: tuple[str, str], limit: f
 def _corrected(p: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], float]:
     from statsmodels.stats.multitest import multipletests
 
-    return (
-        dict(zip(p, map(float, multipletests(list(p.values()), method="holm")[1]), strict=True)) if p else {}
-    )
+    found = multipletests(list(p.values()), method="holm")[1] if p else ()
+    return dict(zip(p, map(float, found), strict=True))
 
 
 def _compare(

@@ -43,10 +43,8 @@ TASK_S = 1.0
 PLACES = 10  # factor by which the trials of a cell are repeated so that no participant is turned away
 FACTOR = 1e6  # factor by which reading times are divided
 LATE = 999  # number of a participant who times out
-_UNREAD = re.compile(
-    r"<(head|script|noscript)\b.*?</\1>|<[^>]*>", re.DOTALL
-)  # parts of a page that are not words
 TIMEOUT_S = 400.0  # HTTP timeout in seconds, long enough for the compilation during the first request
+_UNREAD = re.compile(r"<(head|script|noscript)\b.*?</\1>|<[^>]*>", re.DOTALL)  # parts without visible words
 
 # A function that is given the name and URL of a page, and its content if the URL alone does not show it
 Photograph = Callable[[str, str, str], Awaitable[None]]

@@ -37,7 +37,7 @@ def transaction(
     """
 
     @functools.wraps(method)
-    async def run(self: Any, *args: Arguments.args, **options: Arguments.kwargs) -> Result:
+    async def run(self: Any, /, *args: Arguments.args, **options: Arguments.kwargs) -> Result:
         database: Database = self._database
         return await database.write(lambda connection: method(self, connection, *args, **options))
 
