@@ -2,11 +2,11 @@
 
 import asyncio
 import datetime
+import re
 import socket
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import AbstractContextManager, asynccontextmanager, nullcontext
 from dataclasses import dataclass, field, replace
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any, cast
 from urllib.parse import urlencode
@@ -44,6 +44,7 @@ PLACES = 10  # factor by which the trials of a cell are repeated so that no part
 FACTOR = 1e6  # factor by which reading times are divided
 LATE = 999  # number of a participant who times out
 TIMEOUT_S = 400.0  # HTTP timeout in seconds, long enough for the compilation during the first request
+_UNREAD = re.compile(r"<(head|script|noscript)\b.*?</\1>|<[^>]*>", re.DOTALL)  # parts without visible words
 
 # A function that is given the name and URL of a page, and its content if the URL alone does not show it
 Photograph = Callable[[str, str, str], Awaitable[None]]
@@ -194,25 +195,7 @@ class _Walk:
 
 
 def _words_of(page: str) -> int:
-    text = _Text()
-    text.feed(page)
-    return text.words
-
-
-class _Text(HTMLParser):
-    def __init__(self) -> None:
-        super().__init__()
-        self.words, self._hidden = 0, 0
-
-    def handle_starttag(self, tag: str, attrs: Any) -> None:  # noqa: ARG002 - required by HTMLParser
-        self._hidden += tag in ("head", "script", "noscript")
-
-    def handle_endtag(self, tag: str) -> None:
-        self._hidden -= tag in ("head", "script", "noscript")
-
-    def handle_data(self, data: str) -> None:
-        if not self._hidden:
-            self.words += len(data.split())
+    return len(_UNREAD.sub(" ", page).split())
 
 
 class _Server(uvicorn.Server):
