@@ -16,6 +16,7 @@ from experiments.study.data.copies import INDEX, note_copy
 from experiments.study.file import Study
 from experiments.trials.table import trial_columns
 from experiments.visit.plan import SURVEY
+from experiments.visit.procedure import ATTEMPTS
 from experiments.visit.store import Answer, PersonRow, Store, TrialRow
 from experiments.visit.texts.items import Item
 from mjsim.support.files import exchange, work_folder, write_text_atomically
@@ -97,7 +98,7 @@ async def export(study: Study, store: Store, folder: Path, out: Path, *, replace
     answers = [row for row in await store.answers() if row.final and row.person_id in people]
     tables: dict[str, Table] = {
         "": found.rows,
-        "phases": await _phases(store, people),
+        "phases": await _phases(store, people, answers),
         "answers": list(_answers(study, answers)),
         "texts": [{"participant": p, "item": item, "text": words} for p, item, words in found.texts],
     }
@@ -132,8 +133,9 @@ def _name(row: TrialRow) -> str:
     return f"p{row.person_id:05d}"
 
 
-async def _phases(store: Store, people: Mapping[int, PersonRow]) -> Table:
+async def _phases(store: Store, people: Mapping[int, PersonRow], answers: Iterable[Answer]) -> Table:
     rows: list[dict[str, Any]] = []
+    rejected = {(row.person_id, row.phase): row.value for row in answers if row.item == ATTEMPTS}
     order: dict[int, int] = {}
     for phase in sorted(await store.phases(), key=lambda row: (row.person_id, row.shown)):
         if phase.person_id not in people:
@@ -145,7 +147,7 @@ async def _phases(store: Store, people: Mapping[int, PersonRow]) -> Table:
                 "phase": phase.name,
                 "order": number,
                 "duration_s": phase.duration_s,
-                "attempts": phase.attempts,
+                "attempts": rejected.get((phase.person_id, phase.name), 0),
                 "reason": phase.reason,
             }
         )
