@@ -17,7 +17,6 @@ import numpy as np
 import uvicorn
 
 from experiments.analysis.study.table import ANALYSIS
-from experiments.house import House
 from experiments.record.phases import TASK
 from experiments.study.data.analyses import analysis_faults
 from experiments.study.data.collect import collect, write_collected
@@ -26,6 +25,7 @@ from experiments.study.plan import plan_of
 from experiments.study.rehearsal.person import QUEUE, REFUSED, Rehearsed, SimulatedPerson, Surroundings
 from experiments.study.rehearsal.pictures import HELP
 from experiments.study.rehearsal.plan import Leaving, Planned, link_parameters, rehearsed
+from experiments.study.rehearsal.player import homes_in
 from experiments.study.rehearsal.report import STATUS, TABLE
 from experiments.visit.folders import VISITS, VisitFolders
 from experiments.visit.phases.base import FormPhase
@@ -80,7 +80,7 @@ async def dry_run(
             base,
             client,
             {phase.name: phase for phase in procedure.phases},
-            House.load(study.cells[0].trial(0).house),
+            homes_in(folders),
             link_parameters(study, platform),
             study.settings.minimum,
             study.settings.limits.attempts,

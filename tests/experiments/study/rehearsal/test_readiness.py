@@ -169,11 +169,10 @@ class _Sloppy(FormPhase):
 
 
 @pytest.fixture
-def quick(monkeypatch, house):
-    """Nobody plays a trial or waits long in the queue, and the house is there."""
+def quick(monkeypatch):
+    """Nobody plays a trial or waits long in the queue."""
     monkeypatch.setattr(SimulatedPerson, "_play", _play_nothing)
     monkeypatch.setattr("experiments.study.rehearsal.person.QUEUE_PAUSE", 0.1)
-    monkeypatch.setattr(runs.House, "load", lambda _: house)
 
 
 def _walked(study, folder, monkeypatch, phases=None):
