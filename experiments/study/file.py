@@ -97,6 +97,7 @@ class StudySettings(_Table, frozen=True):
     consent_version: str = "1"  # version of the consent text, which is stored with each agreement
     phases: tuple[str, ...] = PHASES
     require_film: bool = False  # if True, participants must play the film to its end
+    explain_markers: bool = False  # if True, the instructions show a picture of the condition's markers
     assignment: Literal["balanced", "uniform"] = "balanced"
     minimum: dict[str, Any] = {}  # minimum duration of phases, in seconds
     optional: tuple[str, ...] = ()

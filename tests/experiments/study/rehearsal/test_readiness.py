@@ -209,6 +209,22 @@ def test_a_dry_run_goes_every_way_that_there_is(study, tmp_path, monkeypatch):
     assert walked.words["consent"] > 100 and walked.words["survey"] > 200
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick")
+def test_a_dry_run_shows_the_markers_of_each_condition_if_they_are_explained(tmp_path, monkeypatch):
+    phases = 'phases = ["consent", "task", "debriefing", "completion"]'
+    changed = with_text(
+        tmp_path,
+        phases=("minutes = 10", f"minutes = 10\n{phases}\nexplain_markers = true"),
+        minimum=("story = 20", ""),
+    )
+    _, pictures = _walked(changed, tmp_path, monkeypatch)
+    conditions = [
+        f"task-{name}" for name in dict.fromkeys(cell.trials[0].assistance for cell in changed.cells)
+    ]
+    assert [name for name in pictures if name.startswith("task-")] == conditions
+
+
 async def _play_nothing(self, trial, leaves):  # noqa: ARG001 - everybody stays
     """The trial is over at once; what is tested here is what is around it."""
     address = self._around.base.replace("http", "ws", 1) + self.rehearsed.link
