@@ -53,7 +53,7 @@ def shown_pictures(config: TrialConfig, shown: House, *, explained: bool = False
     model, receptacle = catalogue.objects[category.objects[0]], catalogue.receptacles[category.receptacle]
     labels = {f"object:{model.key}": model.label, f"receptacle:{receptacle.key}": receptacle.label}
     found = encoded_pictures(config.house, "minimap" in config.assistance)
-    markers = marker_picture(house(config.house), config.assistance) if explained else MarkerPicture()
+    markers = marker_picture(house(config.house), config) if explained else MarkerPicture()
     return Pictures({**found, "markers": markers.picture} if markers.roles else found, labels, markers.roles)
 
 

@@ -22,7 +22,10 @@ from mjsim.render import Renderer
 from mjsim.support.files import write_text_atomically
 from mjsim.values.episode import Episode, PlacedObject, StartPose
 
-OBJECTS, SEED = 14, 2**31 - 1  # number of sampled objects, and the house seed, which no study uses by chance
+OBJECTS, SEED = (
+    14,
+    2**31 - 1,
+)  # largest number of sampled objects, and their seed, which no study uses by chance
 AHEAD = 2.5  # preferred length of the path to the object in the picture, in metres
 SIZE = (640, 400)  # size of the picture in pixels
 
@@ -34,14 +37,22 @@ class MarkerPicture(msgspec.Struct, frozen=True):
     roles: tuple[str, ...] = ()
 
 
-def marker_picture(house: House, assistance: str) -> MarkerPicture:
-    """Return an example of a condition's markers. It is drawn once per condition and house, then read from the cache.
+def marker_picture(house: House, trial: TrialConfig) -> MarkerPicture:
+    """Return an example of the markers of a trial's condition.
+
+    It is drawn once per condition and house, and then read from the cache.
 
     The picture shows the start of a task with an object of its own, from a corner of the largest room. Drawing requires
     OpenGL.
     """
+    places = len(house.sample_points(seed=SEED, points=trial.points))
     config = TrialConfig(
-        objects=OBJECTS, assistance=assistance, house_seed=SEED, seed=SEED, fidelity="event", regret=False
+        objects=min(OBJECTS, places),
+        assistance=trial.assistance,
+        points=trial.points,
+        seed=SEED,
+        fidelity="event",
+        regret=False,
     )
     key = fingerprint(config, trial_inputs(config, house.catalogue))
     # The name begins like that of the welcome page's picture, so exported pages leave the file out.
