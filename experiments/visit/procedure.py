@@ -254,6 +254,7 @@ class BrowserPlayer:
             floor_plan=procedure.plan.floor_plan and phase == TASK,
             language=procedure.plan.language,
             texts=procedure.plan.texts["hud"].words,
+            explains_markers=procedure.plan.explains_markers,
         )
 
     async def over(self, trial: LiveTrial) -> None:  # noqa: ARG002
