@@ -30,12 +30,11 @@ def places_for_objects(spaces: Sequence[Space], bins: Sequence[BinPlacement]) ->
     """Return the places on furniture for objects, which are apart from each other and from the bins."""
     found: list[Point] = []
     for space in spaces:
-        for piece, pose in space.stood:
-            for place in (moved_point(at, pose.x, pose.y, pose.yaw) for at in piece.places):
-                apart = all(math.dist(place[:2], other[:2]) >= PLACES_APART for other in found)
-                apart &= all(math.dist(place[:2], placed.position[:2]) >= FROM_BIN for placed in bins)
-                if apart and place[2] <= HIGHEST_PLACE and space.can_take(place):
-                    found.append(place)
+        places = [moved_point(at, p.x, p.y, p.yaw) for piece, p in space.stood for at in piece.places]
+        for place in space.reachable([place for place in places if place[2] <= HIGHEST_PLACE]):
+            apart = all(math.dist(place[:2], other[:2]) >= PLACES_APART for other in found)
+            if apart and all(math.dist(place[:2], placed.position[:2]) >= FROM_BIN for placed in bins):
+                found.append(place)
     return tuple(found)
 
 

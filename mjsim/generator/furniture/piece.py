@@ -125,9 +125,9 @@ def moved(spot: Spot, x: float, y: float, yaw: float) -> Spot:
     """Rotate and translate a rectangle. Return the bounding rectangle of the result, in metres."""
     cos, sin = math.cos(yaw), math.sin(yaw)
     corners = [(u, v) for u in (spot[0], spot[2]) for v in (spot[1], spot[3])]
-    xs = [round(x + cos * u - sin * v, 4) for u, v in corners]
-    ys = [round(y + sin * u + cos * v, 4) for u, v in corners]
-    return min(xs), min(ys), max(xs), max(ys)
+    xs = [x + cos * u - sin * v for u, v in corners]
+    ys = [y + sin * u + cos * v for u, v in corners]
+    return round(min(xs), 4), round(min(ys), 4), round(max(xs), 4), round(max(ys), 4)
 
 
 def moved_point(point: Point, x: float, y: float, yaw: float) -> Point:

@@ -101,9 +101,9 @@ def test_a_place_behind_something_is_no_place() -> None:
     space = Space.of(studio(), studio().rooms[1], np.random.default_rng(0))
     x, y = space.room.floor.center
     space.hit.append((x - 0.3, y - 0.3, x + 0.3, y + 0.3))
-    assert space.can_take((x, y - 0.15, 0.7))
+    assert space.reachable([(x, y - 0.15, 0.7)])
     space.drawn = np.vstack([space.drawn, [x - 0.3, y - 0.35, 0.7, x + 0.3, y - 0.3, 0.95]])
-    assert not space.can_take((x, y - 0.15, 0.7))
+    assert not space.reachable([(x, y - 0.15, 0.7)])
 
 
 def test_all_places_of_use_can_be_reached(home: FurnishedHome) -> None:
