@@ -263,8 +263,8 @@ class FurnishedHome:
         return Furnishing(tuple(placements), tuple(self.mounts), self.places)
 
 
-def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> Furnishing:
-    """Place furniture, decoration and bins in a floor plan. Equal arguments give equal results.
+def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> FurnishedHome:
+    """Place furniture, decoration and bins in a floor plan, in several attempts. Equal arguments give equal homes.
 
     Args:
         plan: The floor plan, with rooms, doors and windows.
@@ -275,11 +275,6 @@ def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) ->
     Raises:
         HouseError: A required piece does not fit into this floor plan.
     """
-    return furnish_home(plan, bins, palette, seed).furnishing()
-
-
-def furnish_home(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> FurnishedHome:
-    """Furnish a home in several attempts. Raise `HouseError` if required furniture does not fit."""
     look = draw_appearance(palette, stream(seed, "look"))
     for attempt in range(ATTEMPTS):
         home = FurnishedHome(plan, bins, look, seed, attempt)

@@ -8,7 +8,7 @@ import numpy as np
 from mjsim.generator.default_furniture import SHOWN_NAMES
 from mjsim.generator.furniture.appearance import Appearance
 from mjsim.generator.furniture.piece import BIN_SIZES, Piece, Point, flattened, moved, moved_point
-from mjsim.generator.space import PiecePose, Space
+from mjsim.generator.space import PiecePose, Space, footprint
 from mjsim.generator.values import BinPlacement, HomePlan, Placement, Rectangle
 from mjsim.values.episode import FLOOR_SHARE
 
@@ -64,7 +64,7 @@ def describe_place(space: Space, piece: Piece, receptacle: str) -> str:
     spot = space.solids[-1]
     nearest = None
     for other, pose in space.stood[:-1]:
-        box = moved((-other.size[0] / 2, 0, other.size[0] / 2, other.size[1]), pose.x, pose.y, pose.yaw)
+        box = footprint(other, pose)
         dx, dy = max(box[0] - spot[2], spot[0] - box[2], 0), max(box[1] - spot[3], spot[1] - box[3], 0)
         gap = math.hypot(dx, dy)
         if gap < 0.8 and (nearest is None or gap < nearest[0]) and other.kind not in BIN_SIZES:

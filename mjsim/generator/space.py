@@ -55,6 +55,12 @@ class PiecePose:
         return self.turns * math.pi / 2
 
 
+def footprint(piece: Piece, pose: PiecePose) -> Spot:
+    """Return the rectangle on the floor that a piece covers, in metres."""
+    w, d, _ = piece.size
+    return moved((-w / 2, 0, w / 2, d), pose.x, pose.y, pose.yaw)
+
+
 @dataclass
 class Space:
     """A room with the furniture that has been placed so far.
@@ -88,27 +94,25 @@ class Space:
         space.drawn = drawn_boxes(room_shell(plan, room))
         for door in plan.doors_of(room.key):
             side, half = door.side_in(room.key), door.width / 2
-            across = floor.depth if side in ("south", "north") else floor.width
-            deep = min(DOORWAY, max(0.75, across - 0.3))
+            deep = min(DOORWAY, max(0.75, space.depth(side) - 0.3))
             zone = floor.along(side, door.center - half - 0.06, door.center + half + 0.06, 0, deep)
-            space.keep.append((zone.x0, zone.y0, zone.x1, zone.y1))
+            space.keep.append(zone.spot)
             for zones, wide in ((space.corners, BESIDE), (space.beside, BESIDE_MIN), (space.ways, 0.0)):
                 zone = floor.along(side, door.center - half - wide, door.center + half + wide, 0, BESIDE)
-                zones.append((zone.x0, zone.y0, zone.x1, zone.y1))
+                zones.append(zone.spot)
             space.doors.append(floor.along(side, door.center, door.center, 0.42, 0.42).center)
             space.hung.append((side, door.center - half - 0.12, door.center + half + 0.12, 0.0))
             if door.leaf is not None and door.leaf.room == room.key:
-                leaf = door.leaf.floor
-                space.solids.append((leaf.x0, leaf.y0, leaf.x1, leaf.y1, door.height))
-                space.hit.append(space.solids[-1][:4])
-                low, high = (leaf.x0, leaf.x1) if door.leaf.side in ("south", "north") else (leaf.y0, leaf.y1)
-                space.hung.append((door.leaf.side, low, high, 0.0))
-                zone = floor.along(door.leaf.side, low, high, 0, BEFORE_LEAF)
-                space.keep.append((zone.x0, zone.y0, zone.x1, zone.y1))
+                leaf = door.leaf
+                space.solids.append((*leaf.floor.spot, door.height))
+                space.hit.append(leaf.floor.spot)
+                low, high = leaf.floor.wall(leaf.side)
+                space.hung.append((leaf.side, low, high, 0.0))
+                space.keep.append(floor.along(leaf.side, low, high, 0, BEFORE_LEAF).spot)
         for window in plan.windows_of(room.key):
             half = window.width / 2 + (LEAVES if room.use in BLINDS else CURTAIN)
             zone = floor.along(window.side, window.center - half, window.center + half, 0, BEFORE_WINDOW)
-            space.windows.append((zone.x0, zone.y0, zone.x1, zone.y1, window.sill))
+            space.windows.append((*zone.spot, window.sill))
             space.hung.append((window.side, window.center - half - 0.05, window.center + half + 0.05, 0.0))
         return space
 

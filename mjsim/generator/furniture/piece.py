@@ -5,7 +5,7 @@ room, and the +z axis points up. Lengths are in metres.
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -103,7 +103,7 @@ class Piece:
         return [
             part.spot
             for part in self.parts
-            if not any(other.top < part.top and _overlap(other.spot, part.spot) for other in self.parts)
+            if not any(other.top < part.top and overlap(other.spot, part.spot) for other in self.parts)
         ]
 
     @cached_property
@@ -151,7 +151,8 @@ def intersect(boxes: Boxes, others: Boxes) -> bool:
     return bool((high - low > SLACK).all(axis=-1).any())
 
 
-def _overlap(a: Spot, b: Spot) -> bool:
+def overlap(a: Sequence[float], b: Sequence[float]) -> bool:
+    """Return True if two rectangles (x0, y0, x1, y1) overlap. Sharing an edge does not count."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 

@@ -84,23 +84,22 @@ def _seat(b: Builder, draw: Callable[[Builder], Piece]) -> Piece:
 
 def dining(b: Builder) -> Piece:
     against = b.smaller >= 1
-    name = "table" if against or b.chance(0.7) else "round_table"
-    made = Builder(name, b.rng, b.look, b.smaller)
-    base = table(made) if name == "table" else round_table(made)
+    kind = table if against or b.chance(0.7) else round_table
+    base = b.draw(kind, b.smaller)
     w, d, _ = base.size
     chair = _seat(b, seats.dining_chair)
     edges = []  # middle of each seat's table edge, and the direction in which a person sits there
-    each = 2 if w >= 1.15 and b.smaller < 2 and name == "table" else 1
+    each = 2 if w >= 1.15 and b.smaller < 2 and kind is table else 1
     for i in range(each):
         x = (i + 0.5) * w / each - w / 2
         edges += [(x, d, math.pi)] if against else [(x, d, math.pi), (x, 0.0, 0.0)]
-    if name == "round_table" or (w >= 1.5 and b.chance(0.5)) or b.smaller:
+    if kind is round_table or (w >= 1.5 and b.chance(0.5)) or b.smaller:
         edges += [(side * w / 2, d / 2, side * math.pi / 2) for side in (-1, 1)]
     members = [(base, 0.0, 0.0, 0.0)]
     for edge in edges:
         members.append(pushed_in(members, chair, *edge))
     if b.chance(0.7):
-        members.append((pendant_lamp(Builder("pendant_lamp", b.rng, b.look)), 0.0, d / 2 - 0.3, 0.0))
+        members.append((b.draw(pendant_lamp), 0.0, d / 2 - 0.3, 0.0))
     return group(b.kind, members, use=(), stands="wall" if against else "free")
 
 
@@ -198,8 +197,8 @@ def _desk(b: Builder) -> Piece:
 
 
 def desk(b: Builder) -> Piece:
-    base = _desk(Builder("desk", b.rng, b.look, b.smaller))
-    chair = seats.office_chair(Builder("office_chair", b.rng, b.look))
+    base = b.draw(_desk, b.smaller)
+    chair = b.draw(seats.office_chair)
     w, d, _ = base.size
     x = 0.22 if w > 1.1 else 0.25
     turn = math.pi + float(b.rng.uniform(-0.35, 0.35))
