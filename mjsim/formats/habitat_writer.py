@@ -18,7 +18,6 @@ import numpy as np
 import shapely
 import trimesh
 from PIL import Image
-from trimesh.transformations import quaternion_matrix
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
@@ -137,6 +136,12 @@ def _pose(position: Floats, rotation: Floats) -> Floats:
     return np.asarray(_UPRIGHT @ own @ Y_TO_Z)
 
 
+def _turned(quaternion: Sequence[float]) -> Floats:
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, np.array(quaternion, np.float64))
+    return matrix.reshape(3, 3)
+
+
 def _mount(house: CompiledHouse, key: str) -> tuple[Floats, Floats]:
     site = house.model.site(f"mount:{key}").id
     return house.data.site_xpos[site].copy(), house.data.site_xmat[site].reshape(3, 3).copy()
@@ -226,7 +231,7 @@ def _episode(house: CompiledHouse, episode: Episode, scene: str, number: int) ->
         model, receptacle = _slug(placed.model), episode.targets[placed.name]
         handle = f"{model}_:{counts.get(model, 0):04d}"
         counts[model] = counts.get(model, 0) + 1
-        pose = _pose(np.array(placed.position), quaternion_matrix(placed.quaternion)[:3, :3])
+        pose = _pose(np.array(placed.position), _turned(placed.quaternion))
         objects.append([model + _OBJECT, pose.tolist()])
         geometry = house.receptacles[receptacle]
         targets[handle] = _pose(geometry.center, geometry.rotation).tolist()
