@@ -255,11 +255,12 @@ def _around_best(
     if is_searched:
         bound = grown(bound, best, MAX_ROWS, end)
     least = _least(bound, problem)
+    names, carried = problem.names[:n], problem.names[n:]
     dearest = (2 * n + len(problem.onboard)) * int(metric.max())  # upper bound on tour lengths
     while is_searched:
         longest = best + math.floor(min(radius / unit, dearest))
         most = min(MAX_STATES, search.share(problem))
-        costs, states = costs_by_pass(bound, list(possible_next(problem)), longest, most, end)
+        costs, states = costs_by_pass(bound, names, carried, longest, most, end)
         search.spend(states)
         if costs is not None:
             return _ranked(problem, costs, unit, longest, least)
@@ -270,8 +271,8 @@ def _around_best(
 
 def _least(bound: Bound, problem: RoutingProblem) -> Costs:
     """Return a lower bound on the cost of each possible next visit, in units."""
-    n, table = len(problem.shipments), bound.table
-    relaxed = costs_in(bound.instance, table, len(table.bin) - 1, problem.names[:n], problem.names[n:])
+    n = len(problem.shipments)
+    relaxed = costs_in(bound.instance, bound.table, (1 << n) - 1, problem.names[:n], problem.names[n:])
     return {visit: cost - bound.prices for visit, cost in relaxed.items()}
 
 

@@ -6,20 +6,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.exact.annealing import anneal, anneal_from, completed, tour_actions
-from planner.exact.expand import PLACE_BITS, expand, offer_roots
+from planner.exact.annealing import anneal, completed, tour_actions
+from planner.exact.expand import PLACE_BITS, Search, layers
 from planner.exact.instance import MAX_SEARCHED, Instance
 from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown, warm_bound
-from planner.exact.nodes import FIRST_ROOM, NO_PARENT, keep_best, new_nodes
+from planner.exact.nodes import NO_PARENT
 from planner.exact.table import BIN_ROWS, INFINITE, Solution
 from planner.exact.warm_start import Start
 from planner.plan import Certificate, Proof
 from planner.solvers import NEVER, Deadline
 
-ANNEALING_MOVES = 10_000
+MOVES, TEMPERATURES = (
+    10_000,
+    (0.5, 0.01),
+)  # annealing of a first tour; temperatures are relative to the mean leg
 # Limits for finding a first plan from a warm start, in about 20 ms
 WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
-WARM_TEMPERATURES = (0.1, 0.02)  # first and last temperature, relative to the mean leg length
+WARM_TEMPERATURES = (0.1, 0.02)
 
 
 def improving_tours(
@@ -62,14 +65,13 @@ def _first_tour(
     instance: Instance, seed: int, work: int, start: Start | None, warm_rows: int
 ) -> tuple[Bound, int, int, list[int], int]:
     if start is None:
-        length, order = anneal(instance, seed, ANNEALING_MOVES)
-        bound = first_bound(instance, int(length))
+        length, order = anneal(instance, seed, MOVES, np.arange(len(instance.home)), *TEMPERATURES)
+        bound = first_bound(instance, length)
     else:
-        length, order = anneal_from(
-            instance, seed, WARM_MOVES, completed(instance, start.order), *WARM_TEMPERATURES
-        )
+        order = completed(instance, start.order)
+        length, order = anneal(instance, seed, WARM_MOVES, order, *WARM_TEMPERATURES)
         bound = warm_bound(instance, start, warm_rows)
-    upper, lower, expanded = int(length), bound.root, 0
+    upper, lower, expanded = length, bound.root, 0
     actions: list[int] = tour_actions(instance, order).tolist()
     if start is not None and work > 0 and len(instance.home) <= MAX_SEARCHED:
         narrow = beam_pass(bound, upper, WARM_WIDTH, work, NEVER)
@@ -105,25 +107,18 @@ def beam_pass(bound: Bound, upper: int, width: int, max_states: int, deadline: D
     n, prices = len(bound.instance.home), bound.prices
     limit = upper - bound.instance.tie + prices
     history: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
-    here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
-    offer_roots(bound.instance, bound.table, here, after, limit)
     left_out, expanded, actions = INFINITE, 0, None
-    for layer in range(n + 1):
-        if expanded > max_states or deadline.over():
-            return Pass(upper, None, bound.root, expanded)
-        here, worse = keep_best(here, width)
-        found = expand(bound.instance, bound.table, here, after, limit, width, deadline)
-        if found is None:
-            return Pass(upper, None, bound.root, expanded)
-        here, after, early, states, end = found
-        left_out = min(left_out, worse, early)
-        expanded += states
-        size = here.size[0]
-        history.append((here.key[:size].copy(), here.parent[:size].copy()))
-        if end >= 0:
-            upper = int(here.cost[end]) - prices
-            actions = _actions(bound, history, layer, end)
-        here, after = after, new_nodes(FIRST_ROOM)
+    for found in layers(Search(bound.instance, bound.table, limit, width), deadline):
+        left_out, expanded = min(left_out, found.smallest), expanded + found.states
+        size = found.here.size[0]
+        history.append((found.here.key[:size].copy(), found.here.parent[:size].copy()))
+        if found.end >= 0:
+            upper = int(found.here.cost[found.end]) - prices
+            actions = _actions(bound, history, len(history) - 1, found.end)
+        if expanded > max_states:
+            break
+    if len(history) <= n:
+        return Pass(upper, None, bound.root, expanded)
     lower = max(bound.root, min(upper, min(limit, left_out) - prices))
     return Pass(upper, actions, lower, expanded)
 
@@ -149,6 +144,6 @@ def _actions(
         left ^= picked
         if picked:
             actions.append(picked.bit_length() - 1)
-        if place < m * m:
-            actions.append(-1 - place // m)
+        if place < 2 * m * m:
+            actions.append(-1 - place // (2 * m))
     return actions

@@ -129,21 +129,21 @@ class TaskSearch:
         return plan
 
     def _bounded(self, problem: RoutingProblem, instance: Instance, seed: int, end: Deadline) -> Solution:
-        from planner.exact.annealing import anneal_from, completed, tour_actions
+        from planner.exact.annealing import anneal, completed, tour_actions
         from planner.exact.cuts.branch_and_cut import tours_by_cuts
         from planner.exact.cuts.graph import state_graph
         from planner.exact.cuts.known_cuts import KnownCuts
 
         n, known = len(problem.shipments), self._cuts
         order = completed(instance, self._warm.indices(problem.names[:n]))
-        length, order = anneal_from(instance, seed, MOVES, order, *TEMPERATURES)
+        length, order = anneal(instance, seed, MOVES, order, *TEMPERATURES)
         proof, bound = Certificate(Proof.CUTS, instance.unit, 0, multipliers=(0,) * n), 0
         cuts: tuple[Cut, ...] = ()
         if known is not None:
             root = known.root(problem, instance, state_graph(instance))
             cuts = tuple(cut for cut, _ in root.cuts)
             proof, bound = root.certificate(instance.unit, known.certificate.parts), root.value
-        first = Solution(tour_actions(instance, order).tolist(), min(bound, int(length)), proof)
+        first = Solution(tour_actions(instance, order).tolist(), min(bound, length), proof)
         if bound >= (1 - WIDE) * length or n > self._refined - PAUSE:
             return first
         *_, best = first, *tours_by_cuts(instance, seed, CUTS_WORK, end, first, cuts)

@@ -26,7 +26,7 @@ class TableState(NamedTuple):
 
     instance: Instance
     table: CostTable
-    row: int
+    row: int  # bit mask of the remaining objects
     names: tuple[str, ...]
     metric: NDArray[np.int64]  # integer distances of the current problem, shape (k, k)
     unit: float  # length of one unit in metres
