@@ -8,13 +8,13 @@ from planner.exact.instance import make_instance
 from planner.exact.multipliers import Bound, first_bound, grown, warm_bound
 from planner.exact.solver import ExactSolver
 from planner.exact.table_regret import Costs, costs_by_pass, costs_in
-from planner.exact.task_search import TaskSearch, deadline
+from planner.exact.task_search import TaskSearch
 from planner.exact.task_table import TaskTable
 from planner.geodesics import Geodesics
 from planner.plan import Plan, Status, Visit
 from planner.problem import RoutingProblem, possible_next, tour_length
 from planner.route import TaskState
-from planner.solvers import SolveLimit, Solver
+from planner.solvers import Deadline, SolveLimit, Solver
 from planner.task_problems import TaskProblems
 from planner.tour_bounds import TourBounds, after, is_for
 
@@ -248,19 +248,18 @@ def _around_best(
         return _estimated(plan, search.least(problem, limit), problem.integers.unit)
     metric, unit = problem.integers.metric, problem.integers.unit
     best = int(tour_length(problem, plan.visits, metric))
-    is_searched, end = plan.status is Status.OPTIMAL and search.share(problem) > 0, deadline(limit)
+    is_searched, end = plan.status is Status.OPTIMAL and search.share(problem) > 0, Deadline.of(limit)
     instance, n = make_instance(problem, metric), len(problem.shipments)
     start = search.start(problem, instance)
     bound = first_bound(instance, best) if start is None else warm_bound(instance, start, MAX_ROWS)
     if is_searched:
         bound = grown(bound, best, MAX_ROWS, end)
     least = _least(bound, problem)
-    names, carried = problem.names[:n], problem.names[n:]
     dearest = (2 * n + len(problem.onboard)) * int(metric.max())  # upper bound on tour lengths
     while is_searched:
         longest = best + math.floor(min(radius / unit, dearest))
         most = min(MAX_STATES, search.share(problem))
-        costs, states = costs_by_pass(bound, names, carried, longest, most, end)
+        costs, states = costs_by_pass(bound, list(possible_next(problem)), longest, most, end)
         search.spend(states)
         if costs is not None:
             return _ranked(problem, costs, unit, longest, least)
@@ -271,8 +270,8 @@ def _around_best(
 
 def _least(bound: Bound, problem: RoutingProblem) -> Costs:
     """Return a lower bound on the cost of each possible next visit, in units."""
-    n = len(problem.shipments)
-    relaxed = costs_in(bound.instance, bound.table, (1 << n) - 1, problem.names[:n], problem.names[n:])
+    n, table = len(problem.shipments), bound.table
+    relaxed = costs_in(bound.instance, table, len(table.bin) - 1, problem.names[:n], problem.names[n:])
     return {visit: cost - bound.prices for visit, cost in relaxed.items()}
 
 

@@ -96,7 +96,8 @@ class VisibilityGraph:
             ),
             shape=(size, size),
         )
-        return dijkstra(graph, indices=np.arange(len(self.vertices), size), return_predecessors=True)
+        over, before = dijkstra(graph, indices=np.arange(len(self.vertices), size), return_predecessors=True)
+        return over, before
 
 
 def _rings(geometry: shapely.Geometry) -> list[NDArray[np.float64]]:

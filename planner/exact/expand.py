@@ -1,13 +1,11 @@
 """Kernels that expand one layer of the search.
 
 Layer k contains the states in which k objects have been picked up. A state is encoded as U * 2^12 + place,
-where U is the bit mask of the remaining objects. The place is the column of the state in a cost table: `2 m b + d`
-at bin b with an object for bin d in hand, `2 m b + b` at bin b with empty hands, and `2 m m + i` at object i with
-only this object in hand. The start is the place `2 m m + n`. There are no states at a second object, because the
-person always goes on to one of two bins.
+where U is the bit mask of the remaining objects. The place is `b * m + d` at bin b with an object for bin d
+in hand, `b * m + b` at bin b with empty hands, and `m * m + i` at object i with only this object in hand.
+There are no states at a second object, because the person always goes on to one of two bins.
 """
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -15,47 +13,24 @@ from numpy.typing import NDArray
 
 from mjsim.support.kernels import inlined, kernel
 from planner.exact.instance import Instance
-from planner.exact.nodes import (
-    FIRST_ROOM,
-    NO_PARENT,
-    Nodes,
-    keep_best,
-    new_nodes,
-    offer,
-    with_room,
-    with_room_among,
-)
+from planner.exact.nodes import NO_PARENT, Nodes, offer, with_room, with_room_among
 from planner.exact.table import INFINITE, CostTable
 from planner.solvers import Deadline
 
 PLACE_BITS = 12
 SLICE = 1 << 12  # number of states expanded between two checks of the deadline, which takes about 5 ms
-
-
-class Search(NamedTuple):
-    """A search that keeps the best `width` states of each layer, among those with a total below `limit`."""
-
-    instance: Instance
-    table: CostTable  # lower bounds on the cost-to-go
-    limit: int
-    width: int
+CARRYING, EMPTY = range(2)  # stages of expanding a layer
+STAGE, DONE, OF, SMALLEST, STATES, END = range(6)  # indices into `progress`
 
 
 class Expanded(NamedTuple):
     """The result of expanding a layer."""
 
     here: Nodes  # the expanded layer, including states reached by placing an object in its bin
-    smallest: int  # smallest total of all dropped states, or `INFINITE`
+    after: Nodes  # the next layer
+    smallest: int  # smallest total of all states dropped to save memory, or `INFINITE`
     states: int  # number of expanded states
     end: int  # index of the state that ends the shortest complete tour, or -1
-
-
-class Arcs(NamedTuple):
-    """The legs that lead from a state to the next state."""
-
-    key: NDArray[np.int64]  # code of the state at the end of each leg
-    leg: NDArray[np.int64]  # length of each leg, which includes the way from a second object to a bin
-    picked: NDArray[np.int64]  # object that is picked up, or -1 if the leg only leads to a bin
 
 
 @kernel
@@ -67,135 +42,168 @@ def row_of(table: CostTable, left: int) -> int:
     return row
 
 
-@inlined
-def place_of(key: int) -> int:
-    return key & ((1 << PLACE_BITS) - 1)
+class LegEnd(NamedTuple):
+    """The state at the end of a leg, before an object is picked up or placed."""
+
+    left: int
+    row: int
+    cost: int
+    parent: int
 
 
 @inlined
-def is_empty_handed(inst: Instance, key: int) -> bool:
-    m = inst.bins.shape[0]
-    place = place_of(key)
-    return place < 2 * m * m and place // (2 * m) == place % (2 * m)
-
-
-@kernel
-def new_arcs(inst: Instance) -> Arcs:
-    size = 2 * inst.home.size + 2
-    return Arcs(np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size, np.int64))
-
-
-@inlined
-def add_arc(arcs: Arcs, count: int, left: int, place: int, leg: int, picked: int) -> int:
-    arcs.key[count], arcs.leg[count], arcs.picked[count] = left << PLACE_BITS | place, leg, picked
-    return count + 1
-
-
-@inlined
-def arcs_from(inst: Instance, key: int, arcs: Arcs) -> int:
-    """Write the legs that lead from a state to `arcs`, and return their number."""
-    n, m = inst.to_bin.shape
-    left, place = key >> PLACE_BITS, place_of(key)
-    i, b, count = place - 2 * m * m, place // (2 * m), 0
-    first, second = -1, -1  # bins of the objects in hand
-    to_object, to_bin = inst.root, inst.root_bin
-    if i == n:
-        if inst.carried.size > 0:
-            first, second = inst.carried[0], inst.carried[1] if inst.carried.size > 1 else -1
-    elif i >= 0:
-        to_object, to_bin, first = inst.between[i], inst.to_bin[i], inst.home[i]
-    else:
-        to_object, to_bin = inst.from_bin[b], inst.bins[b]
-        first = place % (2 * m)
-        first = first if first != b else -1
-    if first >= 0:
-        count = add_arc(
-            arcs, count, left, 2 * m * first + (second if second >= 0 else first), to_bin[first], -1
-        )
-    if second >= 0:
-        return add_arc(arcs, count, left, 2 * m * second + first, to_bin[second], -1)
-    for j in range(n):
-        if not left >> j & 1:
-            continue
-        rest, c, leg = left ^ (1 << j), inst.home[j], to_object[j]
-        if first < 0:
-            count = add_arc(arcs, count, rest, 2 * m * m + j, leg, j)
-            continue
-        count = add_arc(arcs, count, rest, 2 * m * first + c, leg + inst.to_bin[j, first], j)
-        if c != first:
-            count = add_arc(arcs, count, rest, 2 * m * c + first, leg + inst.to_bin[j, c], j)
-    return count
-
-
-@inlined
-def offer_next(
-    search: Search, here: Nodes, after: Nodes, state: tuple[int, int, int, int], arcs: Arcs
+def offer_bin(
+    inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, b: int, d: int, limit: int
 ) -> None:
-    """Add the states that follow a state to its own layer or to the next layer.
+    """Add a state at bin b to a layer if the total of the state is below the limit."""
+    total = arrival.cost + table.bin[arrival.row, b, d]
+    if total < limit:
+        place = b * inst.bins.shape[0] + d
+        offer(nodes, (arrival.left << PLACE_BITS) | place, arrival.cost, total, arrival.parent)
 
-    `state` contains the state's key and cost, and its code as a parent in both layers.
-    """
-    inst, table, (key, cost, parent_here, parent_after) = search.instance, search.table, state
-    m = inst.bins.shape[0]
-    width, row = 2 * m * m + inst.home.size, row_of(table, key >> PLACE_BITS)
-    for a in range(arcs_from(inst, key, arcs)):
-        j, onward, there = arcs.picked[a], cost + arcs.leg[a], row
-        if j >= 0:
-            there, onward = row - table.stride[j], onward + table.multipliers[j]
-        total = onward + table.entries[there * width + place_of(arcs.key[a])]
-        if total < search.limit and j < 0:
-            offer(here, arcs.key[a], onward, total, parent_here)
-        elif total < search.limit:
-            offer(after, arcs.key[a], onward, total, parent_after)
+
+@inlined
+def offer_second(
+    inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, j: int, d: int, limit: int
+) -> None:
+    c = inst.home[j]
+    left, row = arrival.left ^ (1 << j), arrival.row - table.stride[j]
+    cost = arrival.cost + table.multipliers[j]
+    first = LegEnd(left, row, cost + inst.to_bin[j, d], arrival.parent)
+    offer_bin(inst, table, nodes, first, d, c, limit)
+    if c != d:
+        second = LegEnd(left, row, cost + inst.to_bin[j, c], arrival.parent)
+        offer_bin(inst, table, nodes, second, c, d, limit)
+
+
+@inlined
+def offer_only(inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, i: int, limit: int) -> None:
+    cost = arrival.cost + table.multipliers[i]
+    total = cost + table.object[arrival.row - table.stride[i], i]
+    if total < limit:
+        place = inst.bins.shape[0] ** 2 + i
+        offer(nodes, ((arrival.left ^ (1 << i)) << PLACE_BITS) | place, cost, total, arrival.parent)
 
 
 @kernel
-def first_layers(search: Search) -> tuple[Nodes, Nodes]:
-    """Return the first two layers, with the states that directly follow the start of a tour."""
-    n, m = search.instance.to_bin.shape
-    here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
-    key = ((1 << n) - 1) << PLACE_BITS | (2 * m * m + n)
-    offer_next(search, here, after, (key, 0, NO_PARENT, NO_PARENT), new_arcs(search.instance))
+def offer_roots(inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int) -> None:
+    """Add the states that directly follow the start of a tour to the first two layers."""
+    n = inst.home.size
+    left, row = (1 << n) - 1, table.bin.shape[0] - 1
+    if inst.carried.size == 0:
+        for i in range(n):
+            arrival = LegEnd(left, row, int(inst.root[i]), NO_PARENT)
+            offer_only(inst, table, after, arrival, i, limit)
+        return
+    d, other = inst.carried[0], inst.carried[inst.carried.size - 1]
+    offer_bin(inst, table, here, LegEnd(left, row, int(inst.root_bin[d]), NO_PARENT), d, other, limit)
+    if inst.carried.size == 2:
+        offer_bin(inst, table, here, LegEnd(left, row, int(inst.root_bin[other]), NO_PARENT), other, d, limit)
+        return
+    for j in range(n):
+        offer_second(inst, table, after, LegEnd(left, row, int(inst.root[j]), NO_PARENT), j, d, limit)
+
+
+def expand(
+    inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, deadline: Deadline
+) -> Expanded | None:
+    """Expand all states of a layer. Return None if the deadline passes first."""
+    progress = np.array([0, 0, 0, INFINITE, 0, -1])
+    while True:
+        here, after = expand_some(inst, table, here, after, limit, width, progress)
+        if progress[STAGE] > EMPTY:
+            return Expanded(here, after, *progress[SMALLEST:].tolist())
+        if deadline.over():
+            return None
+
+
+@kernel
+def expand_some(
+    inst: Instance,
+    table: CostTable,
+    here: Nodes,
+    after: Nodes,
+    limit: int,
+    width: int,
+    progress: NDArray[np.int64],
+) -> tuple[Nodes, Nodes]:
+    """Expand some states of a layer. States with an object in hand come before those with empty hands."""
+    if progress[STAGE] == CARRYING and progress[DONE] == 0:
+        progress[OF] = here.size[0]
+        here = with_room(here, here.size[0])
+    slice_left = SLICE
+    while slice_left > 0 and progress[STAGE] <= EMPTY:
+        first, last = progress[DONE], min(progress[OF], progress[DONE] + slice_left)
+        if progress[STAGE] == CARRYING:
+            after, smallest, count = expand_carrying(inst, table, here, after, limit, width, first, last)
+        else:
+            after, smallest, count, end = expand_empty(inst, table, here, after, limit, width, first, last)
+            if end >= 0 and (progress[END] < 0 or here.cost[end] < here.cost[progress[END]]):
+                progress[END] = end
+        progress[SMALLEST] = min(progress[SMALLEST], smallest)
+        progress[STATES] += count
+        slice_left -= last - first
+        progress[DONE] = last
+        if last == progress[OF]:
+            progress[STAGE] += 1
+            progress[DONE], progress[OF] = 0, here.size[0]
     return here, after
 
 
 @kernel
-def expand(
-    search: Search, here: Nodes, after: Nodes, first: int, last: int, empty: bool, end: int
-) -> tuple[Nodes, int, int, int]:
-    """Expand a range of states with empty or full hands.
-
-    Return the next layer, the smallest dropped total, the number of expanded states, and the updated `end`.
-    """
-    smallest, expanded, arcs = INFINITE, 0, new_arcs(search.instance)
-    most = search.instance.home.size if empty else 2 * search.instance.home.size
+def expand_carrying(
+    inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
+) -> tuple[Nodes, int, int]:
+    n, m = inst.to_bin.shape
+    smallest, expanded = INFINITE, 0
     for k in range(first, last):
-        key, cost = here.key[k], here.cost[k]
-        if here.total[k] >= search.limit or is_empty_handed(search.instance, key) != empty:
+        place = here.key[k] & ((1 << PLACE_BITS) - 1)
+        i = place - m * m
+        b, d = place // m, place % m
+        if here.total[k] >= limit or (i < 0 and b == d):
             continue
         expanded += 1
-        if key >> PLACE_BITS == 0 and empty and (end < 0 or cost < here.cost[end]):
-            end = k
-        if after.size[0] + most > after.key.size:
-            after, dropped = with_room_among(after, most, search.width)
+        if i >= 0:
+            d, home_leg = inst.home[i], inst.to_bin[i, inst.home[i]]
+        else:
+            home_leg = inst.bins[b, d]
+        left = here.key[k] >> PLACE_BITS
+        row = row_of(table, left)
+        arrival = LegEnd(left, row, int(here.cost[k] + home_leg), 2 * k + 1)
+        offer_bin(inst, table, here, arrival, d, d, limit)
+        if after.size[0] + 2 * n > after.key.size:
+            after, dropped = with_room_among(after, 2 * n, width)
             smallest = min(smallest, dropped)
-        offer_next(search, here, after, (key, cost, 2 * k + 1, 2 * k), arcs)
+        for j in range(n):
+            if not left >> j & 1:
+                continue
+            leg = inst.between[i, j] if i >= 0 else inst.from_bin[b, j]
+            arrival = LegEnd(left, row, int(here.cost[k] + leg), 2 * k)
+            offer_second(inst, table, after, arrival, j, d, limit)
+    return after, smallest, expanded
+
+
+@kernel
+def expand_empty(
+    inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
+) -> tuple[Nodes, int, int, int]:
+    n, m = inst.to_bin.shape
+    smallest, expanded, end = INFINITE, 0, -1
+    for k in range(first, last):
+        place = here.key[k] & ((1 << PLACE_BITS) - 1)
+        b = place // m
+        if here.total[k] >= limit or place >= m * m or b != place % m:
+            continue
+        expanded += 1
+        left = here.key[k] >> PLACE_BITS
+        if left == 0 and (end < 0 or here.cost[k] < here.cost[end]):
+            end = k
+        row = row_of(table, left)
+        if after.size[0] + n > after.key.size:
+            after, dropped = with_room_among(after, n, width)
+            smallest = min(smallest, dropped)
+        for i in range(n):
+            if left >> i & 1:
+                arrival = LegEnd(left, row, int(here.cost[k] + inst.from_bin[b, i]), 2 * k)
+                offer_only(inst, table, after, arrival, i, limit)
     return after, smallest, expanded, end
-
-
-def layers(search: Search, deadline: Deadline) -> Iterator[Expanded]:
-    """Expand all layers in turn, beginning with that of the start. There are fewer layers if the deadline passes."""
-    here, after = first_layers(search)
-    for _ in range(len(search.instance.home) + 1):
-        here, smallest = keep_best(here, search.width)
-        here, states, end = with_room(here, here.size[0]), 0, -1
-        for empty in (False, True):  # states with an object in hand come before those with empty hands
-            size = int(here.size[0])
-            for first in range(0, size, SLICE):
-                if deadline.over():
-                    return
-                last = min(first + SLICE, size)
-                after, dropped, count, end = expand(search, here, after, first, last, empty, end)
-                smallest, states = min(smallest, dropped), states + count
-        yield Expanded(here, smallest, states, end)
-        here, after = after, new_nodes(FIRST_ROOM)

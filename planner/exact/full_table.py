@@ -53,5 +53,10 @@ def follow(inst: Instance, table: CostTable, row: int) -> tuple[int, list[int]]:
     `row` is the table row of the objects that remain at the start.
     """
     actions: NDArray[np.int64] = np.empty(2 * len(inst.home) + 2, np.int64)
-    length, count = walk(inst, table, row, actions)
+    if COMPILER in sys.modules:
+        from planner.exact.table_kernels import walk as compiled_walk
+
+        length, count = compiled_walk(inst, table, row, actions)
+    else:
+        length, count = walk(inst, table, row, actions)
     return int(length), actions[:count].tolist()

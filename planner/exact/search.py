@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.exact.annealing import anneal, completed, tour_actions
-from planner.exact.expand import PLACE_BITS, Search, layers
+from planner.exact.expand import PLACE_BITS, expand, offer_roots
 from planner.exact.instance import MAX_SEARCHED, Instance
 from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown, warm_bound
-from planner.exact.nodes import NO_PARENT
+from planner.exact.nodes import FIRST_ROOM, NO_PARENT, keep_best, new_nodes
 from planner.exact.table import BIN_ROWS, INFINITE, Solution
 from planner.exact.warm_start import Start
 from planner.plan import Certificate, Proof
@@ -107,18 +107,25 @@ def beam_pass(bound: Bound, upper: int, width: int, max_states: int, deadline: D
     n, prices = len(bound.instance.home), bound.prices
     limit = upper - bound.instance.tie + prices
     history: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
+    here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
+    offer_roots(bound.instance, bound.table, here, after, limit)
     left_out, expanded, actions = INFINITE, 0, None
-    for found in layers(Search(bound.instance, bound.table, limit, width), deadline):
-        left_out, expanded = min(left_out, found.smallest), expanded + found.states
-        size = found.here.size[0]
-        history.append((found.here.key[:size].copy(), found.here.parent[:size].copy()))
-        if found.end >= 0:
-            upper = int(found.here.cost[found.end]) - prices
-            actions = _actions(bound, history, len(history) - 1, found.end)
-        if expanded > max_states:
-            break
-    if len(history) <= n:
-        return Pass(upper, None, bound.root, expanded)
+    for layer in range(n + 1):
+        if expanded > max_states or deadline.over():
+            return Pass(upper, None, bound.root, expanded)
+        here, worse = keep_best(here, width)
+        found = expand(bound.instance, bound.table, here, after, limit, width, deadline)
+        if found is None:
+            return Pass(upper, None, bound.root, expanded)
+        here, after, early, states, end = found
+        left_out = min(left_out, worse, early)
+        expanded += states
+        size = here.size[0]
+        history.append((here.key[:size].copy(), here.parent[:size].copy()))
+        if end >= 0:
+            upper = int(here.cost[end]) - prices
+            actions = _actions(bound, history, layer, end)
+        here, after = after, new_nodes(FIRST_ROOM)
     lower = max(bound.root, min(upper, min(limit, left_out) - prices))
     return Pass(upper, actions, lower, expanded)
 
@@ -144,6 +151,6 @@ def _actions(
         left ^= picked
         if picked:
             actions.append(picked.bit_length() - 1)
-        if place < 2 * m * m:
-            actions.append(-1 - place // (2 * m))
+        if place < m * m:
+            actions.append(-1 - place // m)
     return actions

@@ -5,20 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.support.kernels import inlined, kernel
-from planner.exact.expand import (
-    PLACE_BITS,
-    Arcs,
-    Search,
-    arcs_from,
-    is_empty_handed,
-    layers,
-    new_arcs,
-    row_of,
-)
+from mjsim.support.kernels import kernel
+from planner.exact.expand import PLACE_BITS, expand, offer_roots
 from planner.exact.instance import MAX_SEARCHED, Instance
 from planner.exact.multipliers import Bound
-from planner.exact.nodes import Nodes, new_nodes, slot_of
+from planner.exact.nodes import FIRST_ROOM, Nodes, new_nodes, slot_of
 from planner.exact.table import INFINITE, CostTable
 from planner.plan import Visit, VisitKind
 from planner.solvers import Deadline
@@ -29,115 +20,141 @@ Costs = dict[Visit, int]  # length of the remaining tour in units, by next visit
 
 
 def costs_in(
-    instance: Instance, table: CostTable, left: int, names: Sequence[str], carried: Sequence[str]
+    instance: Instance, table: CostTable, row: int, names: Sequence[str], carried: Sequence[str]
 ) -> Costs:
     """Return the cost of each possible next visit. If the table is relaxed, return lower bounds, plus the prices.
 
-    `left` is the bit mask of the objects that remain at the start. `names` contains the names of the instance's
-    objects, and `carried` the names of the carried objects.
+    `row` is the table row of the objects that remain at the start. `names` contains the names of the
+    instance's objects, and `carried` the names of the carried objects.
     """
-    arcs, width = start_arcs(instance, left), 2 * len(instance.bins) ** 2 + len(instance.home)
-    rows = row_of(table, left) - np.append(table.stride, 0)[arcs.picked]
-    rest = table.entries[rows * width + (arcs.key & ((1 << PLACE_BITS) - 1))].astype(np.int64)
-    return _by_visit(instance, arcs, rest + np.append(table.multipliers, 0)[arcs.picked], names, carried)
+    held, home = instance.carried.tolist(), instance.home
+    costs = {}
+    for k, (b, name) in enumerate(zip(held, carried, strict=True)):
+        other = held[1 - k] if len(held) == 2 else b
+        costs[Visit(VisitKind.PLACE, name)] = int(instance.root_bin[b]) + int(table.bin[row, b, other])
+    if len(held) < 2:
+        j = np.flatnonzero(row // table.stride % (table.size[table.group] + 1))
+        left, c = row - table.stride[j], home[j]
+        if held:
+            own_last = instance.to_bin[j, held[0]] + table.bin[left, held[0], c]
+            rest = np.minimum(own_last, instance.to_bin[j, c] + table.bin[left, c, held[0]])
+        else:
+            rest = table.object[left, j].astype(np.int64)
+        found = (instance.root[j] + table.multipliers[j] + rest).tolist()
+        costs |= {Visit(VisitKind.PICK, names[k]): cost for k, cost in zip(j.tolist(), found, strict=True)}
+    return costs
 
 
 def costs_by_pass(
-    bound: Bound,
-    names: Sequence[str],
-    carried: Sequence[str],
-    longest: int,
-    max_states: int,
-    deadline: Deadline,
+    bound: Bound, visits: Sequence[Visit], longest: int, max_states: int, deadline: Deadline
 ) -> tuple[Costs | None, int]:
     """Return the cost of each possible next visit in units, and the number of states.
 
     Costs above `longest` are not exact. The search visits every state on a tour of at most this length. A
-    backward sweep then computes the shortest remaining tour from each state. The arguments `names` and `carried` are
-    those of `costs_in`. The costs are None if there are too many objects, more than `max_states` states, or the
+    backward sweep then computes the shortest remaining tour from each state. `visits` lists the possible next
+    visits, places first. The costs are None if there are too many objects, more than `max_states` states, or the
     deadline has passed.
     """
-    instance, n = bound.instance, len(bound.instance.home)
+    instance, table = bound.instance, bound.table
+    n = len(instance.home)
     if n > MAX_SEARCHED:
         return None, 0
-    found: list[Nodes] = []
+    limit = longest + 1 + bound.prices
+    layers: list[Nodes] = []
+    here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
+    offer_roots(instance, table, here, after, limit)
     states = 0
-    search = Search(instance, bound.table, longest + 1 + bound.prices, UNLIMITED)
-    for layer in layers(search, deadline):
-        found.append(layer.here)
-        states += int(layer.here.size[0])
+    for _ in range(n + 1):
+        expanded = expand(instance, table, here, after, limit, UNLIMITED, deadline)
+        if expanded is None:
+            return None, states
+        here, after = expanded.here, expanded.after
+        layers.append(here)
+        states += int(here.size[0])
         if states > max_states:
             return None, states
-    if len(found) <= n:
-        return None, states
-    after, after_rest = new_nodes(1), np.zeros(0, np.int64)
-    for here in found[::-1]:
-        second = after, after_rest
-        after_rest = sweep(instance, here, *second)
-        after = here
-    arcs = start_arcs(instance, (1 << n) - 1)
-    rest = rests(arcs, after, after_rest, *second)
-    return _by_visit(instance, arcs, rest, names, carried), states
-
-
-def _by_visit(
-    instance: Instance, arcs: Arcs, rest: NDArray[np.int64], names: Sequence[str], carried: Sequence[str]
-) -> Costs:
-    """Return the least cost of the first legs of each visit, given the cost after each leg."""
-    costs: Costs = {}
-    held, m = list(zip(instance.carried.tolist(), carried, strict=True)), len(instance.bins)
-    totals = np.minimum(arcs.leg + rest, INFINITE).tolist()
-    for key, j, cost in zip(arcs.key.tolist(), arcs.picked.tolist(), totals, strict=True):
-        b = (key & ((1 << PLACE_BITS) - 1)) // (2 * m)
-        visits = [Visit(VisitKind.PLACE, name) for home, name in held if home == b]
-        for visit in [Visit(VisitKind.PICK, names[j])] if j >= 0 else visits:
-            costs[visit] = min(cost, costs.get(visit, cost))
-    return costs
+        here, after = after, new_nodes(FIRST_ROOM)
+    rest = [np.zeros(0, np.int64)] * (n + 1)
+    beyond, nothing = here, np.zeros(0, np.int64)
+    for k in range(n, -1, -1):
+        after, after_rest = (layers[k + 1], rest[k + 1]) if k < n else (beyond, nothing)
+        rest[k] = sweep(instance, layers[k], after, after_rest)
+    first = (layers[1], rest[1]) if n else (beyond, nothing)
+    found = root_costs(instance, layers[0], rest[0], *first)
+    # With a capacity of one, `found` may end with picks that are not in `visits`.
+    return {visit: int(cost) for visit, cost in zip(visits, found, strict=False)}, states
 
 
 @kernel
-def start_arcs(inst: Instance, left: int) -> Arcs:
-    """Return the first legs of tours, given the bit mask of the objects that remain at the start."""
-    n, m = inst.to_bin.shape
-    arcs = new_arcs(inst)
-    count = arcs_from(inst, left << PLACE_BITS | (2 * m * m + n), arcs)
-    return Arcs(arcs.key[:count], arcs.leg[:count], arcs.picked[:count])
+def look_up(nodes: Nodes, rest: NDArray[np.int64], left: int, place: int) -> int:
+    k = nodes.slots[slot_of(nodes, (left << PLACE_BITS) | place)]
+    return int(rest[k]) if k >= 0 else INFINITE
 
 
-@inlined
-def rest_after(
-    arcs: Arcs, a: int, here: Nodes, rest: NDArray[np.int64], after: Nodes, after_rest: NDArray[np.int64]
+@kernel
+def after_second(
+    inst: Instance, after: Nodes, after_rest: NDArray[np.int64], left: int, j: int, d: int
 ) -> int:
-    """Return the remaining tour length after a leg from a layer, given the lengths for this and the next layer."""
-    if arcs.picked[a] < 0:
-        k = here.slots[slot_of(here, arcs.key[a])]
-        return int(rest[k]) if k >= 0 else INFINITE
-    k = after.slots[slot_of(after, arcs.key[a])]
-    return int(after_rest[k]) if k >= 0 else INFINITE
-
-
-@kernel
-def rests(
-    arcs: Arcs, here: Nodes, rest: NDArray[np.int64], after: Nodes, after_rest: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    found = np.empty(arcs.key.size, np.int64)
-    for a in range(found.size):
-        found[a] = rest_after(arcs, a, here, rest, after, after_rest)
-    return found
+    m = inst.bins.shape[0]
+    c = inst.home[j]
+    first = inst.to_bin[j, d] + look_up(after, after_rest, left, d * m + c)
+    second = inst.to_bin[j, c] + look_up(after, after_rest, left, c * m + d)
+    return int(min(first, second))
 
 
 @kernel
 def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the remaining tour length of each state in a layer, given the lengths for the next layer."""
-    arcs, size = new_arcs(inst), here.size[0]
+    n, m = inst.to_bin.shape
+    size = here.size[0]
     rest = np.full(size, INFINITE, np.int64)
-    for empty in (True, False):  # states with an object in hand are followed by those with empty hands
-        for k in range(size):
-            key = here.key[k]
-            if is_empty_handed(inst, key) != empty:
-                continue
-            best = 0 if empty and key >> PLACE_BITS == 0 else INFINITE
-            for a in range(arcs_from(inst, key, arcs)):
-                best = min(best, arcs.leg[a] + rest_after(arcs, a, here, rest, after, after_rest))
-            rest[k] = best
+    for k in range(size):  # states at a bin with empty hands
+        place = here.key[k] & ((1 << PLACE_BITS) - 1)
+        b, left = place // m, here.key[k] >> PLACE_BITS
+        if place >= m * m or b != place % m:
+            continue
+        best = INFINITE if left else 0
+        for i in range(n):
+            if (left >> i) & 1:
+                best = min(best, inst.from_bin[b, i] + look_up(after, after_rest, left ^ (1 << i), m * m + i))
+        rest[k] = best
+    for k in range(size):  # states with an object in hand
+        place = here.key[k] & ((1 << PLACE_BITS) - 1)
+        i, b, d = place - m * m, place // m, place % m
+        left = here.key[k] >> PLACE_BITS
+        if i < 0 and b == d:
+            continue
+        if i >= 0:
+            d, legs, home_leg = inst.home[i], inst.between[i], inst.to_bin[i, inst.home[i]]
+        else:
+            legs, home_leg = inst.from_bin[b], inst.bins[b, d]
+        best = home_leg + look_up(here, rest, left, d * m + d)
+        for j in range(n):
+            if (left >> j) & 1:
+                best = min(best, legs[j] + after_second(inst, after, after_rest, left ^ (1 << j), j, d))
+        rest[k] = min(best, INFINITE)
     return rest
+
+
+@kernel
+def root_costs(
+    inst: Instance, here: Nodes, rest: NDArray[np.int64], after: Nodes, after_rest: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return the tour length for each possible next visit. Visits that place carried objects come first."""
+    n, m = inst.to_bin.shape
+    count = inst.carried.size
+    everything = (1 << n) - 1
+    costs = np.empty(count + (n if count < 2 else 0), np.int64)
+    for k in range(count):
+        b = inst.carried[k]
+        other = inst.carried[count - 1 - k] if count == 2 else b
+        costs[k] = inst.root_bin[b] + look_up(here, rest, everything, b * m + other)
+    if count < 2:
+        for j in range(n):
+            left = everything ^ (1 << j)
+            if count == 1:
+                then = after_second(inst, after, after_rest, left, j, inst.carried[0])
+            else:
+                then = look_up(after, after_rest, left, m * m + j)
+            costs[count + j] = inst.root[j] + then
+    return costs

@@ -109,7 +109,7 @@ class TaskSearch:
         by_cuts, stopped = self._solver.uses_cuts(instance), limit is not None and limit.stopped
         work = 0 if by_cuts or stopped else self.share(problem)
         if by_cuts:
-            best = self._bounded(problem, instance, seed, deadline(limit))
+            best = self._bounded(problem, instance, seed, Deadline.of(limit))
         else:
             from planner.exact.search import (
                 WARM_ROWS,
@@ -117,7 +117,7 @@ class TaskSearch:
             )  # imported here because it takes 0.5 s
 
             rows, start = HURRIED_ROWS if stopped else WARM_ROWS, self.start(problem, instance)
-            passes, end = self._solver.passes, deadline(limit)
+            passes, end = self._solver.passes, Deadline.of(limit)
             *_, best = improving_tours(instance, seed, work, end, passes, start, rows)
             self.spend(best.expanded)
         visits = to_visits(instance, best.actions, problem.names[:n], problem.names[n:])
@@ -150,10 +150,3 @@ class TaskSearch:
         if best.certificate is not proof:
             self._cuts, self._refined = KnownCuts.of(problem, best.certificate, known), n
         return best
-
-
-def deadline(limit: SolveLimit | None) -> Deadline:
-    """Return the deadline of a search that starts now."""
-    if limit is None:
-        return Deadline(None)
-    return Deadline(None if limit.seconds is None else time.perf_counter() + limit.seconds, limit.stop)
