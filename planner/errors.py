@@ -27,7 +27,3 @@ class UnreachableError(PlannerError):
 
 class ProblemError(PlannerError):
     """Raised if a routing problem is malformed, or if a plan does not solve it."""
-
-
-class InfeasibleError(PlannerError):
-    """Raised if a well-formed problem has no feasible plan."""

@@ -11,14 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from planner.errors import UnreachableError
 from planner.navmesh import TOLERANCE, NavMesh
-from planner.visibility_graph import (
-    Views,
-    VisibilityGraph,
-    direct_distances,
-    distances,
-    shortest_path,
-    visible_vertices,
-)
+from planner.visibility_graph import View, VisibilityGraph, direct_distances, visible_vertices
 
 MAX_CACHED = 4096  # maximum number of points for which visible vertices are cached
 
@@ -36,7 +29,7 @@ class ShortestPath:
 class _Query:
     points: NDArray[np.float64]
     island: NDArray[np.int64]
-    views: Views
+    views: list[View]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +52,7 @@ class Geodesics:
     navmesh: NavMesh
     max_snap: float = 1.0  # maximum distance from a point to the nearest navigable point, in metres
     _graph: VisibilityGraph = field(init=False, repr=False)
-    _remembered: dict[tuple[float, float], tuple[NDArray[np.int32], NDArray[np.float64]]] = field(
-        init=False, repr=False, default_factory=dict
-    )
+    _remembered: dict[tuple[float, float], View] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_graph", VisibilityGraph.build(self.navmesh))
@@ -73,7 +64,7 @@ class Geodesics:
         if np.isfinite(straight) and islands[0] == islands[1]:
             return ShortestPath(points, straight)
         query = self._query(points, islands)
-        length, path = shortest_path(self._graph.edges, query.points, query.views)
+        length, path = self._graph.shortest_path(points, *query.views)
         if not np.isfinite(length):
             raise _unreachable(points[0], points[1])
         return ShortestPath(path, length)
@@ -108,19 +99,16 @@ class Geodesics:
 
     def _query(self, points: NDArray[np.float64], islands: NDArray[np.int64]) -> _Query:
         views = [self._view(x, y, i) for (x, y), i in zip(points.tolist(), islands.tolist(), strict=True)]
-        starts = np.zeros(len(points) + 1, np.int32)
-        np.cumsum([len(seen) for seen, _ in views], out=starts[1:])
-        seen = np.concatenate([np.empty(0, np.int32), *(seen for seen, _ in views)])
-        lengths = np.concatenate([np.empty(0), *(lengths for _, lengths in views)])
-        return _Query(points, islands, Views(starts, seen, lengths))
+        return _Query(points, islands, views)
 
-    def _view(self, x: float, y: float, island: int) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    def _view(self, x: float, y: float, island: int) -> View:
         view = self._remembered.get((x, y))
         if view is None:
             if len(self._remembered) >= MAX_CACHED:
                 self._remembered.clear()
             graph = self._graph
-            view = visible_vertices(x, y, graph.vertices, graph.island == island, graph.walls, TOLERANCE)
+            usable = graph.island == island
+            view = View(*visible_vertices(x, y, graph.vertices, usable, graph.walls, TOLERANCE))
             self._remembered[x, y] = view  # another thread may clear the cache, so do not read it again
         return view
 
@@ -130,7 +118,7 @@ class Geodesics:
         if apart.any():
             i, j = np.argwhere(apart)[0]
             raise _unreachable(sources.points[i], targets.points[j])
-        bent = distances(graph.edges, sources.views, targets.views)
+        bent = graph.distances(sources.views, targets.views)
         result = np.minimum(bent, direct_distances(sources.points, targets.points, graph.walls))
         lost = np.argwhere(~np.isfinite(result))
         if lost.size:

@@ -38,12 +38,6 @@ class GridFrame(NamedTuple):
         y = self.y_min + (np.arange(self.rows) + 0.5) * self.resolution
         return np.stack(np.meshgrid(x, y), axis=-1)
 
-    def columns_rows(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the column and row of each point, shape (2, n). Points outside belong to border cells."""
-        steps = (points - (self.x_min, self.y_min)) / self.resolution
-        cells: NDArray[np.int64] = np.clip(steps.astype(np.int64), 0, (self.columns - 1, self.rows - 1))
-        return cells.T
-
 
 class SegmentGrid(NamedTuple):
     """An index of line segments by the grid cells that they cross."""

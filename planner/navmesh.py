@@ -1,8 +1,4 @@
-"""Navigation meshes, which describe the free floor around obstacles that are inflated by a person's radius.
-
-Most queries are answered by a grid, whose cells are usually on one island or outside all islands. Exact
-polygons are needed only for points in cells that the outline of an island crosses.
-"""
+"""Navigation meshes, which describe the free floor around obstacles that are inflated by a person's radius."""
 
 import math
 from collections.abc import Sequence
@@ -12,16 +8,15 @@ from functools import cached_property
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import label
 from shapely.geometry import MultiPolygon, Polygon
 
 from planner.errors import NavMeshError, NotNavigableError
-from planner.grid import GridFrame, crossed_cells
+from planner.grid import GridFrame
 
 TOLERANCE = 1e-4  # maximum depth to which a path may cut into an inflated obstacle, in metres
 SNAP_CLEARANCE = 1e-6  # distance of snapped points from the boundary in metres, to allow for rounding errors
 ARC_SEGMENTS = 8  # number of segments per quarter circle, which makes path lengths accurate to 0.01 %
-BLOCKED, MIXED = -1, -2  # values of `cells`: outside all islands, or crossed by an outline
+BLOCKED = -1  # index of points outside all islands
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +32,6 @@ class NavMesh:
         frame: Position and size of the grid.
         islands: Connected polygons of free space, largest first.
         solid: Inflated obstacles shrunk by `TOLERANCE`. Paths may not touch them.
-        cells: Value of each grid cell, int32 of shape (rows, columns): the index of the island that contains
-            the whole cell, `BLOCKED` or `MIXED`.
     """
 
     bounds: tuple[float, float, float, float]
@@ -46,7 +39,6 @@ class NavMesh:
     frame: GridFrame
     islands: tuple[Polygon, ...]
     solid: MultiPolygon
-    cells: NDArray[np.int32]
     _inner: NDArray[np.object_] = field(repr=False)  # islands shrunk by `SNAP_CLEARANCE`
     _outer: NDArray[np.object_] = field(repr=False)  # islands grown by half of `TOLERANCE`
 
@@ -89,8 +81,7 @@ class NavMesh:
         shapely.prepare(outer)
         frame = GridFrame.covering(box.bounds, resolution)
         solid = MultiPolygon(_polygons(shapely.buffer(inflated, -TOLERANCE, join_style="mitre")))
-        cells = _cells(frame, islands, outer)
-        return cls(box.bounds, float(agent_radius), frame, tuple(islands), solid, cells, inner, outer)
+        return cls(box.bounds, float(agent_radius), frame, tuple(islands), solid, inner, outer)
 
     @property
     def area(self) -> float:
@@ -105,18 +96,13 @@ class NavMesh:
         centre at x_min + (c + 0.5) * resolution, y_min + (r + 0.5) * resolution. Row 0 has the smallest y, so
         draw the map with the origin at the lower left. `frame.centres()` returns all centres.
         """
-        islands = self.cells.copy()
-        mixed = self.cells == MIXED
-        islands[mixed] = _islands_at(self._outer, self.frame.centres()[mixed])
+        islands = _islands_at(self._outer, self.frame.centres())
         islands.setflags(write=False)
         return islands
 
     def island_of(self, point: ArrayLike) -> int | None:
         """Return the index of the island that contains a point (x, y) in metres, or None if not navigable."""
-        x, y = _point(point)
-        island = self._cell(x, y)
-        if island == MIXED:
-            island = int(_islands_at(self._outer, np.array([[x, y]]))[0])
+        island = int(_islands_at(self._outer, np.array(_point(point))))
         return None if island == BLOCKED else island
 
     def is_navigable(self, point: ArrayLike) -> bool:
@@ -130,8 +116,7 @@ class NavMesh:
         apply. Raises NotNavigableError if the island is more than `max_distance` metres away.
         """
         x, y = _point(point)
-        cell = self._cell(x, y)
-        if cell == island or (cell == MIXED and shapely.intersects_xy(self.islands[island], x, y)):
+        if shapely.intersects_xy(self.islands[island], x, y):
             return np.array([x, y])
         line = shapely.shortest_line(self._inner[island], shapely.Point(x, y))
         nearest = np.asarray(line.coords[0], dtype=np.float64)
@@ -153,18 +138,13 @@ class NavMesh:
         if count is None:  # scalars are ten times as fast as arrays here
             while True:
                 x, y = rng.uniform(x_min, x_max), rng.uniform(y_min, y_max)
-                cell = self._cell(x, y)
-                if cell == 0 or (cell == MIXED and shapely.contains_xy(island, x, y)):
+                if shapely.contains_xy(island, x, y):
                     return np.array([x, y])
         drawn = [np.empty((0, 2))]
         missing = count
         while missing:  # rejection sampling
             points = rng.uniform((x_min, y_min), (x_max, y_max), (missing, 2))
-            columns, rows = self.frame.columns_rows(points)
-            cells = self.cells[rows, columns]
-            inside, mixed = cells == 0, cells == MIXED
-            inside[mixed] = shapely.contains_xy(island, points[mixed])
-            drawn.append(points[inside])
+            drawn.append(points[shapely.contains_xy(island, points)])
             missing -= len(drawn[-1])
         return np.concatenate(drawn)
 
@@ -176,11 +156,6 @@ class NavMesh:
         """
         return _outline(self._outer)
 
-    def _cell(self, x: float, y: float) -> int:
-        x_min, y_min, size, rows, columns = self.frame
-        row, column = int((y - y_min) / size), int((x - x_min) / size)
-        return int(self.cells.item(min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)))
-
 
 def _islands(free: shapely.Geometry) -> tuple[NDArray[np.object_], NDArray[np.object_]]:
     islands = np.array(sorted(_polygons(free), key=lambda p: -p.area), dtype=object)
@@ -189,23 +164,10 @@ def _islands(free: shapely.Geometry) -> tuple[NDArray[np.object_], NDArray[np.ob
     return islands[kept], inner[kept]
 
 
-def _cells(frame: GridFrame, islands: NDArray[np.object_], outer: NDArray[np.object_]) -> NDArray[np.int32]:
-    crossed, _ = crossed_cells(frame, np.concatenate([_outline(islands), _outline(outer)]))
-    mixed = np.zeros((frame.rows, frame.columns), dtype=np.bool_)
-    mixed.ravel()[crossed] = True
-    components, _ = label(~mixed)
-    _, first = np.unique(components, return_index=True)
-    islands_of_components = _islands_at(outer, frame.centres().reshape(-1, 2)[first])
-    cells: NDArray[np.int32] = islands_of_components[components]
-    cells[mixed] = MIXED
-    cells.setflags(write=False)
-    return cells
-
-
 def _islands_at(outer: NDArray[np.object_], points: NDArray[np.float64]) -> NDArray[np.int32]:
-    found = np.full(len(points), BLOCKED, dtype=np.int32)
+    found = np.full(points.shape[:-1], BLOCKED, dtype=np.int32)
     for index in reversed(range(len(outer))):
-        found[shapely.intersects_xy(outer[index], points)] = index
+        found[shapely.intersects_xy(outer[index], points[..., 0], points[..., 1])] = index
     return found
 
 

@@ -112,6 +112,12 @@ class RoutingProblem:
         shipment = self.shipments[number]
         return shipment.pickup if visit.kind is VisitKind.PICK else shipment.delivery
 
+    @property
+    def visits(self) -> list[Visit]:
+        """All visits that complete the task: the picks, and then the places, by object number."""
+        picks = map(self.pick, range(len(self.shipments)))
+        return [*picks, *map(self.place, range(len(self.names)))]
+
     def stops(self, visits: Iterable[Visit]) -> list[int]:
         """Return the indices of the start location and of all visited locations, in order."""
         return [self.start, *map(self.location, visits)]

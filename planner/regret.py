@@ -8,13 +8,13 @@ from planner.exact.instance import make_instance
 from planner.exact.multipliers import Bound, first_bound, grown, warm_bound
 from planner.exact.solver import ExactSolver
 from planner.exact.table_regret import Costs, costs_by_pass, costs_in
-from planner.exact.task_search import TaskSearch, deadline
+from planner.exact.task_search import TaskSearch
 from planner.exact.task_table import TaskTable
 from planner.geodesics import Geodesics
 from planner.plan import Plan, Status, Visit
 from planner.problem import RoutingProblem, possible_next, tour_length
 from planner.route import TaskState
-from planner.solvers import SolveLimit, Solver
+from planner.solvers import Deadline, SolveLimit, Solver
 from planner.task_problems import TaskProblems
 from planner.tour_bounds import TourBounds, after, is_for
 
@@ -248,7 +248,7 @@ def _around_best(
         return _estimated(plan, search.least(problem, limit), problem.integers.unit)
     metric, unit = problem.integers.metric, problem.integers.unit
     best = int(tour_length(problem, plan.visits, metric))
-    is_searched, end = plan.status is Status.OPTIMAL and search.share(problem) > 0, deadline(limit)
+    is_searched, end = plan.status is Status.OPTIMAL and search.share(problem) > 0, Deadline.of(limit)
     instance, n = make_instance(problem, metric), len(problem.shipments)
     start = search.start(problem, instance)
     bound = first_bound(instance, best) if start is None else warm_bound(instance, start, MAX_ROWS)

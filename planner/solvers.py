@@ -57,6 +57,14 @@ class Deadline:
     at: float | None
     stop: threading.Event | None = None
 
+    @classmethod
+    def of(cls, limit: SolveLimit | None, started: float | None = None) -> "Deadline":
+        """Return the end of a search with a limit. By default, the search starts now."""
+        if limit is None:
+            return cls(None)
+        began = time.perf_counter() if started is None else started
+        return cls(None if limit.seconds is None else began + limit.seconds, limit.stop)
+
     @property
     def left(self) -> float:
         """Time until the end in seconds, which is infinite without a time limit."""

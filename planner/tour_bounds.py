@@ -120,7 +120,7 @@ def after(problem: RoutingProblem, visit: Visit) -> RoutingProblem:
 
 def is_for(plan: Plan, problem: RoutingProblem) -> bool:
     """Return True if a plan was made for a problem."""
-    if set(plan.visits) != set(_visits(problem)):
+    if set(plan.visits) != set(problem.visits):
         return False
     return abs(tour_length(problem, plan.visits) - plan.cost) <= SAME
 
@@ -129,27 +129,17 @@ def same_problem(one: RoutingProblem, other: RoutingProblem) -> bool:
     """Return True if two problems have the same objects, the same places and the same start."""
     if not _same_task(one, other):
         return False
-    first, second = (problem.distances[problem.start, _places(problem, one)] for problem in (one, other))
+    first, second = (each.distances[each.start, each.stops(one.visits)[1:]] for each in (one, other))
     return np.allclose(first, second, rtol=0.0, atol=SAME)
 
 
 def _same_task(one: RoutingProblem, other: RoutingProblem) -> bool:
     """Return True if two problems differ at most in their start."""
-    if set(_visits(one)) != set(_visits(other)) or one.capacity != other.capacity:
+    if set(one.visits) != set(other.visits) or one.capacity != other.capacity:
         return False
-    here, there = _places(one, one), _places(other, one)
+    here, there = (problem.stops(one.visits)[1:] for problem in (one, other))
     first, second = one.distances[np.ix_(here, here)], other.distances[np.ix_(there, there)]
     return np.allclose(first, second, rtol=0.0, atol=SAME)
-
-
-def _visits(problem: RoutingProblem) -> list[Visit]:
-    picks = [problem.pick(k) for k in range(len(problem.shipments))]
-    return picks + [problem.place(k) for k in range(len(problem.names))]
-
-
-def _places(problem: RoutingProblem, ordered: RoutingProblem) -> list[int]:
-    """Return the locations of all visits of a problem, in the order of another problem with the same objects."""
-    return [problem.location(visit) for visit in _visits(ordered)]
 
 
 def _rest(problem: RoutingProblem, plan: Plan) -> Plan:

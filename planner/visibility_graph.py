@@ -4,46 +4,29 @@ A shortest path around polygons bends only at reflex vertices of the free space,
 obstacle. The graph therefore contains only tangents (de Berg et al., Computational Geometry, chapter 15).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from heapq import heappop, heappush
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 from shapely.geometry.polygon import orient
 
 from mjsim.support.kernels import kernel
 from planner.grid import SegmentGrid, is_visible
 from planner.navmesh import TOLERANCE, NavMesh
 
-SLACK = 1e-9  # upper bound on rounding errors of path lengths, in metres
 REPEATED = 1e-9  # distance below which two corners of a path are merged, in metres
 
 
-class Edges(NamedTuple):
-    """A graph of points in the plane, in compressed sparse row format."""
+class View(NamedTuple):
+    """The vertices that are visible from a point."""
 
-    vertices: NDArray[np.float64]  # positions in metres in the first two columns
-    starts: NDArray[np.int32]  # index of each vertex's first edge, shape (v + 1,)
-    ends: NDArray[np.int32]  # vertex at the end of each edge, shape (e,)
-    lengths: NDArray[np.float64]  # length of each edge in metres, shape (e,)
-
-
-class Views(NamedTuple):
-    """The vertices that are visible from each of m points, in compressed sparse row format."""
-
-    starts: NDArray[np.int32]  # index of each point's first entry in the other arrays, shape (m + 1,)
-    seen: NDArray[np.int32]  # visible vertices, grouped by point, shape (k,)
-    lengths: NDArray[np.float64]  # distance from the point to each visible vertex in metres, shape (k,)
-
-
-class Paths(NamedTuple):
-    """The shortest known distance to each vertex in metres, and the previous vertex or -1, shape (v,)."""
-
-    over: NDArray[np.float64]
-    before: NDArray[np.int32]
+    seen: NDArray[np.int32]  # indices of the vertices, in ascending order, shape (k,)
+    lengths: NDArray[np.float64]  # distance from the point to each of them in metres, shape (k,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +37,7 @@ class VisibilityGraph:
     vertices: NDArray[np.float64]
     island: NDArray[np.int64]  # island of each vertex, shape (v,)
     walls: SegmentGrid  # edges of the obstacles
-    edges: Edges  # edges between vertices that are visible from each other
+    edges: csr_array  # distances between vertices that are visible from each other in metres, shape (v, v)
 
     @classmethod
     def build(cls, navmesh: NavMesh) -> "VisibilityGraph":
@@ -65,15 +48,56 @@ class VisibilityGraph:
         rows, columns = vertex_pairs(vertices, island, walls, TOLERANCE)
         weights = np.hypot(*(vertices[rows, :2] - vertices[columns, :2]).T)
         count = len(vertices)
-        graph = csr_array(
+        edges = csr_array(
             (np.r_[weights, weights], (np.r_[rows, columns], np.r_[columns, rows])), shape=(count, count)
         )
-        return cls(
-            vertices=vertices,
-            island=island.astype(np.int64),
-            walls=walls,
-            edges=Edges(vertices, graph.indptr.astype(np.int32), graph.indices.astype(np.int32), graph.data),
+        return cls(vertices=vertices, island=island.astype(np.int64), walls=walls, edges=edges)
+
+    def distances(self, sources: Sequence[View], targets: Sequence[View]) -> NDArray[np.float64]:
+        """Return the lengths of shortest paths via vertices in metres, infinite without a path, shape (s, t)."""
+        over, _ = self._paths(sources)
+        found = [(over[:, seen] + lengths).min(axis=1, initial=np.inf) for seen, lengths in targets]
+        return np.array(found).reshape(len(targets), len(sources)).T
+
+    def shortest_path(
+        self, ends: NDArray[np.float64], start: View, goal: View
+    ) -> tuple[float, NDArray[np.float64]]:
+        """Return the length and the points of the shortest path via vertices between two points, in metres.
+
+        `ends` has shape (2, 2), and both views are given. The length is infinite if there is no path.
+        """
+        (over,), (before,) = self._paths([start])
+        totals = over[goal.seen] + goal.lengths
+        if not totals.min(initial=np.inf) < np.inf:
+            return np.inf, ends
+        last = int(np.argmin(totals))
+        corners, vertex = [], int(goal.seen[last])
+        while vertex < len(self.vertices):  # the start is numbered after the vertices
+            corners.append(self.vertices[vertex, :2])
+            vertex = int(before[vertex])
+        points = [ends[0]]
+        for corner in corners[::-1]:
+            if np.hypot(*(corner - points[-1])) > REPEATED:
+                points.append(corner)
+        return float(totals[last]), np.array([*points, ends[1]])
+
+    def _paths(self, views: Sequence[View]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """Return the length of the shortest path from each point to each vertex, and the vertices before the last one.
+
+        The points are nodes without entering edges, numbered after the vertices.
+        """
+        edges, size = self.edges, len(self.vertices) + len(views)
+        starts = edges.indptr[-1] + np.cumsum([len(view.seen) for view in views], dtype=np.int32)
+        graph = csr_array(
+            (
+                np.concatenate([edges.data, *(view.lengths for view in views)]),
+                np.concatenate([edges.indices, *(view.seen for view in views)]),
+                np.concatenate([edges.indptr, starts]),
+            ),
+            shape=(size, size),
         )
+        over, before = dijkstra(graph, indices=np.arange(len(self.vertices), size), return_predecessors=True)
+        return over, before
 
 
 def _rings(geometry: shapely.Geometry) -> list[NDArray[np.float64]]:
@@ -160,95 +184,4 @@ def direct_distances(
         for j in range(b.shape[0]):
             if is_visible(a[i, 0], a[i, 1], b[j, 0], b[j, 1], walls):
                 result[i, j] = np.hypot(b[j, 0] - a[i, 0], b[j, 1] - a[i, 1])
-    return result
-
-
-@kernel
-def search_from(
-    graph: Edges, views: Views, point: int, goal: NDArray[np.float64], rest: NDArray[np.float64]
-) -> tuple[Paths, int]:
-    """Find the shortest paths from a point with the A* algorithm (Hart, Nilsson and Raphael 1968).
-
-    Among equally short paths, it selects the same one as Dijkstra's algorithm. `point` is the index of the
-    start in `views`. `goal` has shape (2,), or is empty to find the paths to all vertices. `rest` is the
-    straight-line distance from each vertex to the goal in metres, infinite if the goal is not visible, shape
-    (v,). Return the paths, and the last vertex of the shortest path to the goal, or -1 if there is none.
-    """
-    size = len(graph.vertices)
-    paths = Paths(np.full(size, np.inf), np.full(size, np.int32(-1), np.int32))
-    last, best = -1, np.inf
-    heap: list[tuple[float, Any]] = [(np.inf, np.int32(-1))]  # (key, vertex); the sentinel is always last
-    for k in range(views.starts[point], views.starts[point + 1]):
-        vertex = views.seen[k]
-        paths.over[vertex] = views.lengths[k]
-        heappush(heap, (views.lengths[k] + at_least(graph, vertex, goal), vertex))
-    while heap[0][1] >= 0 and heap[0][0] <= best + SLACK:
-        key, vertex = heappop(heap)
-        length = paths.over[vertex]
-        if key > length + at_least(graph, vertex, goal):
-            continue  # the vertex was pushed again with a shorter path
-        total = length + rest[vertex]
-        if total < best or (total == best and vertex < last):
-            best, last = total, vertex
-        for edge in range(graph.starts[vertex], graph.starts[vertex + 1]):
-            end, total = graph.ends[edge], length + graph.lengths[edge]
-            if total < paths.over[end]:
-                paths.over[end], paths.before[end] = total, vertex
-                heappush(heap, (total + at_least(graph, end, goal), end))
-            elif total == paths.over[end] and length < earlier(paths, end):
-                paths.before[end] = vertex
-    return paths, last
-
-
-@kernel
-def earlier(paths: Paths, vertex: int) -> float:
-    before = paths.before[vertex]
-    return float(paths.over[before]) if before >= 0 else 0.0
-
-
-@kernel
-def at_least(graph: Edges, vertex: int, goal: NDArray[np.float64]) -> float:
-    if goal.size == 0:
-        return 0.0
-    return float(np.hypot(graph.vertices[vertex, 0] - goal[0], graph.vertices[vertex, 1] - goal[1]))
-
-
-@kernel
-def shortest_path(graph: Edges, ends: NDArray[np.float64], views: Views) -> tuple[float, NDArray[np.float64]]:
-    """Return the length and the points of the shortest path via vertices between two points, in metres.
-
-    `ends` has shape (2, 2), and `views` contains the views of both ends. The length is infinite if there is no path.
-    """
-    rest = np.full(len(graph.vertices), np.inf)
-    for k in range(views.starts[1], views.starts[2]):
-        rest[views.seen[k]] = views.lengths[k]
-    paths, vertex = search_from(graph, views, 0, ends[1], rest)
-    if vertex < 0:
-        return np.inf, ends
-    length, corners = paths.over[vertex] + rest[vertex], [vertex]
-    while paths.before[vertex] >= 0:
-        vertex = paths.before[vertex]
-        corners.append(vertex)
-    points = np.empty((len(corners) + 2, 2))
-    points[0], kept = ends[0], 1
-    for vertex in corners[::-1]:
-        corner = graph.vertices[vertex, :2]
-        if np.hypot(corner[0] - points[kept - 1, 0], corner[1] - points[kept - 1, 1]) > REPEATED:
-            points[kept] = corner
-            kept += 1
-    points[kept] = ends[1]
-    return length, points[: kept + 1].copy()
-
-
-@kernel
-def distances(graph: Edges, sources: Views, targets: Views) -> NDArray[np.float64]:
-    """Return the lengths of shortest paths via vertices in metres, infinite without a path, shape (s, t)."""
-    count, points = len(sources.starts) - 1, len(targets.starts) - 1
-    result = np.full((count, points), np.inf)
-    nowhere, rest = np.empty(0), np.full(len(graph.vertices), np.inf)
-    for s in range(count):
-        paths, _ = search_from(graph, sources, s, nowhere, rest)
-        for t in range(points):
-            for k in range(targets.starts[t], targets.starts[t + 1]):
-                result[s, t] = min(result[s, t], paths.over[targets.seen[k]] + targets.lengths[k])
     return result

@@ -12,6 +12,7 @@ from planner.task_problems import RESOLUTION, TaskProblems
 
 SIDE = 12.0  # side of the square that contains the places of random problems, in metres
 BINS = 6  # number of bins of random problems
+ROOMS = 6  # rooms of a generated home, so that there is space for 24 objects
 # Number of problems by kind and number of objects, 500 in total
 COUNTS: Mapping[str, Mapping[int, int]] = {
     "apartment": {6: 30, 12: 30, 18: 30, 24: 30, 30: 12, 40: 8},
@@ -46,7 +47,7 @@ def _problem(
 ) -> RoutingProblem:
     if kind in ("random", "many bins"):
         return random_problem(objects, BINS if kind == "random" else objects, seed)
-    name = f"generated:{seed}" if kind == "home" else "apartment"
+    name = f"generated:{seed}?rooms={ROOMS}" if kind == "home" else "apartment"
     if name not in houses:
         house = House.load(name)
         houses[name] = house, TaskProblems(house.geodesics)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mjsim.house.check import CheckReport
@@ -32,7 +31,6 @@ def draw_check(path: Path, report: CheckReport) -> None:
     text = "\n".join(textwrap.fill(line, int(wide * LETTERS_PER_INCH)) for line in listed) or "no findings"
     below = 0.3 + 0.145 * (text.count("\n") + 1)
     figure = Figure(figsize=(wide, SIDE * 0.7 + below), dpi=100)
-    FigureCanvasAgg(figure)
     base = below / figure.get_figheight()
     for column, view in enumerate(views):
         width = 1.0 / len(views)
@@ -81,7 +79,6 @@ _BLUE = "#0072B2"
 def draw_disorder(path: Path, disorder: Disorder, kinds: Mapping[str, int]) -> None:
     """Save charts of the misplaced objects in a set of episodes as a PNG. `kinds` counts them by type."""
     figure = Figure(figsize=(11, 3.4), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
     many, far, which = figure.subplots(1, 3)
     counts = Counter(disorder.misplaced)
     many.bar(list(counts), [100 * n / len(disorder.misplaced) for n in counts.values()], color=_BLUE)

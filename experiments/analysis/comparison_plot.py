@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from experiments.analysis.comparison import Block, batch_origin, mean_interval
@@ -22,7 +21,6 @@ def draw_comparison(path: Path, blocks: Sequence[Block], metrics: Sequence[str])
     """Plot a grid of panels with a row per block and a column per metric. The file suffix sets the format."""
     size = PANEL[0] * len(metrics), PANEL[1] * len(blocks) + 0.5
     figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
     panels = figure.subplots(len(blocks), len(metrics), squeeze=False)
     for block, row in zip(blocks, panels, strict=True):
         for metric, axes in zip(metrics, row, strict=True):

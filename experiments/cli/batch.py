@@ -82,11 +82,9 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.cli.terminal import error_console
 
     design = _design(arguments)
-    if (code := run_share(design, arguments)) is not None:
+    if (code := run_share(design, arguments, "trials")) is not None:
         return code
-    rows, failed = run_with_progress(
-        design, arguments.out, arguments.workers, arguments.executor, arguments.packed
-    )
+    rows, failed = run_with_progress(design, arguments.out, arguments, "trials")
     error_console().print(
         f"{counted(len(rows), 'trial')} in {arguments.out}/trials.parquet and .csv; {failed} failed"
     )

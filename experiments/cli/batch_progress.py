@@ -46,15 +46,9 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def run_with_progress(
-    design: Design,
-    out: Path,
-    workers: int | None,
-    executor: str,
-    packed: bool,
-    what: str = "trials",
-    shard: Shard | None = None,
+    design: Design, out: Path, arguments: argparse.Namespace, what: str, shard: Shard | None = None
 ) -> tuple[list[Mapping[str, Any]], int]:
-    """Run all unfinished trials of a design. Return the rows of all trials and the number of failures."""
+    """Run all unfinished trials of a design or shard. Return the rows of all trials and the number of failures."""
     from experiments.trials.batch import BatchProgress, run_batch
 
     failed = 0
@@ -74,9 +68,9 @@ def run_with_progress(
         rows = run_batch(
             design,
             out,
-            workers=workers,
-            executor=executor,
-            packed=packed,
+            workers=arguments.workers,
+            executor=arguments.executor,
+            packed=arguments.packed,
             shard=shard,
             on_progress=show,
             on_note=note,
@@ -124,7 +118,7 @@ def _shard(text: str) -> Shard:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-def run_share(design: Design, arguments: argparse.Namespace, what: str = "trials") -> int | None:
+def run_share(design: Design, arguments: argparse.Namespace, what: str) -> int | None:
     """Run one shard or merge shards, as requested. Return the exit code, or None if neither was requested."""
     from experiments.cli.terminal import error_console
 
@@ -133,9 +127,7 @@ def run_share(design: Design, arguments: argparse.Namespace, what: str = "trials
         return _merge(design, out, arguments.merge, arguments.workers)
     if arguments.shard is None:
         return None
-    rows, failed = run_with_progress(
-        design, out, arguments.workers, arguments.executor, arguments.packed, what, arguments.shard
-    )
+    rows, failed = run_with_progress(design, out, arguments, what, arguments.shard)
     error_console().print(
         f"shard {arguments.shard}: {counted(len(rows), 'trial')} in {out}; {failed} failed; --merge writes the tables"
     )

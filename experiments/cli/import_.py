@@ -1,9 +1,7 @@
 """`mjsim import`: import objects from mesh files, and houses and episodes from other simulators."""
 
 import argparse
-import csv
 import importlib.util
-import io
 import json
 from collections import Counter
 from collections.abc import Sequence
@@ -230,11 +228,10 @@ def run_episodes(arguments: argparse.Namespace) -> int:
 
 
 def _table(found: Sequence[tuple[Path, "EpisodeObject"]]) -> str:
-    text = io.StringIO()
-    rows = csv.DictWriter(text, ["file", *(f.name for f in fields(found[0][1]))], lineterminator="\n")
-    rows.writeheader()
-    rows.writerows({"file": file.name, **asdict(thing)} for file, thing in found)
-    return text.getvalue()
+    from experiments.record.files import csv_text
+
+    columns = ["file", *(f.name for f in fields(found[0][1]))]
+    return csv_text(columns, ([file.name, *asdict(thing).values()] for file, thing in found))
 
 
 def _print_summary(things: Sequence["EpisodeObject"], disorder: "Disorder", kinds: Counter[str]) -> None:

@@ -1,8 +1,6 @@
 """`mjsim metrics`: recompute the metrics of runs and batches."""
 
 import argparse
-import csv
-import io
 import json
 import sys
 from collections.abc import Mapping
@@ -113,14 +111,12 @@ def _measure_all(runs: Mapping[Path, Mapping[str, Any]]) -> tuple[list[Mapping[s
 
 
 def _text(rows: list[Mapping[str, Any]], suffix: str) -> str:
+    from experiments.record.files import csv_text
+
     if suffix == ".json":
         return json.dumps(rows, indent=2) + "\n"
-    text = io.StringIO()
     columns = list(dict.fromkeys(name for row in rows for name in row))
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([_shown(row.get(name)) for name in columns] for row in rows)
-    return text.getvalue()
+    return csv_text(columns, ([_shown(row.get(name)) for name in columns] for row in rows))
 
 
 def _shown(value: Any) -> str:

@@ -1,11 +1,12 @@
 """Read and atomically write files with arrays, JSON and checksums."""
 
+import csv
 import hashlib
 import io
 import json
 import re
 import zipfile
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,13 @@ from mjsim.support.files import read_json as strict_json
 Layout = tuple[str, tuple[int | None, ...]]
 TEXT = "U"
 _LEVEL = 3
+
+
+def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
+    """Format a table as CSV."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([columns, *rows])
+    return text.getvalue()
 
 
 def read_arrays(

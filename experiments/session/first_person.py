@@ -152,11 +152,5 @@ class TrialFilm:
         if self.failure is not None:
             self._path.unlink(missing_ok=True)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def _give_up(self, error: Exception) -> None:
         self.failure = self.failure or f"no video: {error}"

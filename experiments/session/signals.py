@@ -3,6 +3,7 @@
 import asyncio
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from typing import Any, NoReturn, TypeVar
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 T = TypeVar("T")
+RETRY_S = 0.02  # time until a signal is sent again whose exception Python has ignored
 CHECK_TIMEOUT_S = 2.0  # time after which a trial that does not check for signals is interrupted
 
 
@@ -33,13 +35,31 @@ def exit_code(number: int) -> int:
 
 @contextmanager
 def signals_raised() -> Iterator[None]:
-    """Raise `Stopped` in the main thread when a signal arrives."""
+    """Raise `Stopped` in the main thread when a signal arrives.
+
+    Python ignores exceptions in destructors and in callbacks of weak references. A signal that arrives there is
+    sent again a little later.
+    """
+    report, timers = sys.unraisablehook, list[threading.Timer]()
 
     def stop(number: int, _frame: FrameType | None) -> None:
         raise Stopped(number)
 
-    with _handled(stop):
-        yield
+    def send_again(ignored: "sys.UnraisableHookArgs") -> None:
+        if isinstance(ignored.exc_value, Stopped):
+            timers.append(threading.Timer(RETRY_S, os.kill, (os.getpid(), ignored.exc_value.number)))
+            timers[-1].start()
+        else:
+            report(ignored)
+
+    sys.unraisablehook = send_again
+    try:
+        with _handled(stop):
+            yield
+    finally:
+        sys.unraisablehook = report
+        for timer in timers:
+            timer.cancel()
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 import hashlib
 import itertools
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -32,6 +33,9 @@ Code = Annotated[str, msgspec.Meta(pattern=r"^[0-9A-Za-z_-]{0,64}\Z")]
 Site = Annotated[str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?\Z")]
 
 MAX_MINIMUM_S = 86400
+BINS = re.compile(
+    r"\{(bins|categories|count)\}", re.IGNORECASE
+)  # placeholders in a story that depend on the house
 HERE = ("localhost", "127.0.0.1", "::1")  # hosts that may be contacted without TLS
 
 
@@ -93,6 +97,7 @@ class StudySettings(_Table, frozen=True):
     consent_version: str = "1"  # version of the consent text, which is stored with each agreement
     phases: tuple[str, ...] = PHASES
     require_film: bool = False  # if True, participants must play the film to its end
+    explain_markers: bool = False  # if True, the instructions show a picture of the condition's markers
     assignment: Literal["balanced", "uniform"] = "balanced"
     minimum: dict[str, Any] = {}  # minimum duration of phases, in seconds
     optional: tuple[str, ...] = ()
@@ -127,7 +132,10 @@ class StudySettings(_Table, frozen=True):
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of the study design, with one trial for each participant who is needed."""
+    """A cell of the study design, with one trial for each participant who is needed.
+
+    The trials take place in the houses of the design in turn, so participants of a cell spread over them evenly.
+    """
 
     trials: Sequence[TrialConfig]
 
@@ -170,12 +178,16 @@ def read_people_study(path: Path) -> Study:
         raise ConfigError(
             f"{path} has no table [study], which a study with people needs; `mjsim study init` writes one"
         )
+    homes = len({trial.house for trial in design.trials})
     try:
         settings = msgspec.convert(_finite(table), StudySettings)
+        if homes > 1:
+            settings = _without_film(settings, table.get("phases", ()), homes)
         own_texts = path.parent / settings.texts if settings.texts else None
         texts = read_texts(settings.language, own_texts, _values(settings))
         own = design.trials[0].story
-        usual = None if own or STORY not in settings.phases else story_file(settings.language)
+        is_shown = STORY in settings.phases or homes > 1
+        usual = None if own or not is_shown else story_file(settings.language, several_homes=homes > 1)
     except (msgspec.ValidationError, ConfigError) as error:
         raise file.fault(error, "study", _StudyFile) from error
     trials = [_of_a_person(trial, settings.phases, usual) for trial in design.trials]
@@ -183,23 +195,21 @@ def read_people_study(path: Path) -> Study:
         raise ConfigError(
             f"{path}: trials_per_person is for simulated people; a visit of a person has one task"
         )
-    if len(homes := {trial.house for trial in trials}) > 1:
-        told = f"house has {len(homes)} values; a study with people is in one house, so name the same one in all cells"
+    cells = [Cell(tuple(group)) for _, group in itertools.groupby(trials, _of_a_cell)]
+    _check_cells(path, cells)
+    story = story_text(usual if own is None else Path(own))
+    if homes > 1 and (named := BINS.search(story)):
+        told = (
+            f"story has {named[0]}, but the bins differ between the {homes} houses; use other words in {own}"
+        )
         raise file.fault(ConfigError(told), "cells[0]")
-    cells = [Cell(tuple(group)) for _, group in itertools.groupby(trials, _without_seeds)]
-    for name in ("story", "training_assistance"):
-        if len(values := {getattr(cell.trials[0], name) for cell in cells}) > 1:
-            raise ConfigError(
-                f"{path}: cells differ in {name} ({', '.join(map(str, values))}); it is one for all"
-            )
-    story = trials[0].story
     return Study(
         path,
         hashlib.sha256(read_bytes(path)).hexdigest(),
         settings,
         cells,
         texts,
-        story_text(None if story is None else Path(story)),
+        story,
         design.exclusions,
     )
 
@@ -218,16 +228,45 @@ def _finite(table: dict[str, Any], name: str = "") -> dict[str, Any]:
     return table
 
 
+def _without_film(settings: StudySettings, named: Sequence[str], homes: int) -> StudySettings:
+    """Leave out the film of a study in several houses. Raise `ConfigError` if the study file asks for the film."""
+    if FLYTHROUGH in named or settings.require_film:
+        told = "phases has flythrough" if FLYTHROUGH in named else "require_film is true"
+        raise ConfigError(f"{told}, but a film shows one house and the cells have {homes}; leave it out")
+    return msgspec.structs.replace(
+        settings,
+        phases=tuple(name for name in settings.phases if name != FLYTHROUGH),
+        minimum={name: seconds for name, seconds in settings.minimum.items() if name != FLYTHROUGH},
+        optional=tuple(name for name in settings.optional if name != FLYTHROUGH),
+    )
+
+
 def _of_a_person(trial: TrialConfig, phases: Sequence[str], story: Path | None) -> TrialConfig:
     before = [name for name in (STORY, FLYTHROUGH, TRAINING) if name in phases]
     settings: dict[str, Any] = {**trial.settings(), "user": HUMAN, "live": True, "behaviour": {}}
-    if story is not None and trial.story is None:
+    if story is not None and trial.story is None and STORY in phases:
         settings["story"] = str(story)
     return TrialConfig.of({**settings, "phases": ",".join([*before, TASK])})
 
 
-def _without_seeds(trial: TrialConfig) -> str:
-    return repr({name: value for name, value in trial.settings().items() if name not in SEEDS})
+def _check_cells(path: Path, cells: Sequence[Cell]) -> None:
+    """Raise `ConfigError` if a setting that does not belong to a condition differs between cells."""
+    for name in ("story", "training_assistance"):
+        if len(values := {getattr(cell.trials[0], name) for cell in cells}) > 1:
+            raise ConfigError(
+                f"{path}: cells differ in {name} ({', '.join(map(str, values))}); it is one for all"
+            )
+    for trials in itertools.zip_longest(*(cell.trials for cell in cells)):
+        if len(houses := {trial.house for trial in trials if trial is not None}) > 1:
+            told = (
+                f"cells differ in houses ({', '.join(sorted(houses))}); name the same ones in the same order"
+            )
+            raise ConfigError(f"{path}: {told}")
+
+
+def _of_a_cell(trial: TrialConfig) -> str:
+    """Return the settings that all trials of a cell share, as a text."""
+    return repr({name: value for name, value in trial.settings().items() if name not in ("house", *SEEDS)})
 
 
 def _values(settings: StudySettings) -> Mapping[str, str]:

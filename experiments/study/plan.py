@@ -64,5 +64,6 @@ def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None =
         view_path(catalogue, scenes_folder()),
         rehearsal=study.rehearsal,
         film_required=settings.require_film,
+        explains_markers=settings.explain_markers,
         consent_version=settings.consent_version,
     )

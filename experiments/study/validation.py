@@ -2,7 +2,7 @@
 
 import functools
 import importlib.util
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from experiments.errors import ConfigError
@@ -10,12 +10,14 @@ from experiments.house import House
 from experiments.study.file import Study, read_people_study
 from experiments.trials.batch_plan import Houses, check_names, check_settings
 from experiments.trials.design import read_design
+from experiments.trials.setup import trial_episode
 from experiments.trials.toml_file import TomlFile
 from experiments.trials.trial_config import TrialConfig
 from experiments.visit.phases import phases_of
 from experiments.visit.recruiter import OpenLink
 from mjsim.house.catalogue.generated_names import is_generated
 from mjsim.house.compiled.house import MAX_HOUSES
+from mjsim.values.errors import MjsimError
 
 
 def check_study(path: Path, *, recruits: bool = False) -> Study | None:
@@ -44,6 +46,24 @@ def check_study(path: Path, *, recruits: bool = False) -> Study | None:
     except ConfigError as error:
         raise file.fault(error, "study") from error
     return study
+
+
+def check_homes(study: Study, on_home: Callable[[str], object]) -> None:
+    """Load all houses of a study, which generates them, and sample the objects of all trials.
+
+    Raises:
+        ConfigError: A home cannot be generated or used, or has too few places for the objects.
+    """
+    load = functools.lru_cache(MAX_HOUSES)(House.load)
+    trials = {(t.house, t.house_seed, t.objects, t.points): t for cell in study.cells for t in cell.trials}
+    for trial in trials.values():
+        on_home(trial.house)
+        try:
+            trial_episode(trial, load(trial.house))
+        except MjsimError as error:
+            raise ConfigError(
+                f"{study.path}: {trial.house}, house seed {trial.house_seed}: {error}"
+            ) from error
 
 
 def _check_cell(trials: Sequence[TrialConfig], house: Houses) -> None:

@@ -158,7 +158,7 @@ def _run_session(
     error, log = None, EventLog()
     planner = planner or prepared_planner(config, house, scene.episode)
     known_house = house if known.seen is None else dataclasses.replace(house, seen=known.seen)
-    with closing(planner), film or nullcontext():
+    with closing(planner), closing(film) if film else nullcontext():
         user = simulated_user(config, known_house)
         session, _ = prepare_session(config, house, scene, log, film, planner, user=user)
         known.log(log)

@@ -71,6 +71,7 @@ class VisitPlan:
         floor_plan: True if the run directory of the task includes a floor plan with the participant's path.
         rehearsal: True if all participants are simulated.
         film_required: True if participants must play the film to its end.
+        explains_markers: True if the instructions of a trial show a picture of the condition's markers.
         consent_version: The researcher's version of the consent text.
     """
 
@@ -96,6 +97,7 @@ class VisitPlan:
     floor_plan: bool = False
     rehearsal: bool = False
     film_required: bool = False
+    explains_markers: bool = False
     consent_version: str = "1"
 
     @property

@@ -94,7 +94,7 @@ class Procedure:
         if isinstance(read, Again):
             await self.save(now, phase, sent)
             if read.counts:
-                await self.store.save_answers(now.person.id, phase, attempts)
+                await self.store.save_answers(now.person.id, phase, {**attempts, **read.kept})
             self._refusals[now.person.id] = phase, read
             return
         answers = {**read.answers, **(attempts if now.visitor.attempts else {})}
@@ -254,6 +254,7 @@ class BrowserPlayer:
             floor_plan=procedure.plan.floor_plan and phase == TASK,
             language=procedure.plan.language,
             texts=procedure.plan.texts["hud"].words,
+            explains_markers=procedure.plan.explains_markers,
         )
 
     async def over(self, trial: LiveTrial) -> None:  # noqa: ARG002

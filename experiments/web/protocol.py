@@ -156,6 +156,7 @@ class Open(WireMessage, frozen=True):
         restarted: True if the session's previous worker died.
         as_inputs_come: True to run each control step as soon as its inputs have arrived, as in rehearsals.
         texts: HUD texts that override those of the language.
+        explains_markers: True if the instructions show a picture of the condition's markers.
     """
 
     folder: str
@@ -167,6 +168,7 @@ class Open(WireMessage, frozen=True):
     floor_plan: bool = True
     language: str = "en"
     texts: dict[str, str] = msgspec.field(default_factory=dict)
+    explains_markers: bool = False
 
 
 class Taken(WireMessage, frozen=True):

@@ -155,11 +155,13 @@ class Markers(WireMessage, frozen=True):
 class Pictures(WireMessage, frozen=True):
     """Pictures to which `hud` messages refer, as data URLs by key. Each page receives them once.
 
-    `example` has the labels of an object and its receptacle, by key. It is the same in all conditions.
+    `example` has the labels of an object and its receptacle, by key. It is the same in all conditions. `markers` has
+    the roles of the markers in the picture `markers`, if the study explains them and the condition shows any.
     """
 
     pictures: dict[str, str]
     example: dict[str, str]
+    markers: tuple[str, ...] = ()
 
 
 class Hud(WireMessage, frozen=True):

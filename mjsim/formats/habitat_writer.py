@@ -181,8 +181,7 @@ def _scene(house: CompiledHouse, catalogue: Catalogue, name: str) -> dict[str, A
 def _regions(house: CompiledHouse) -> dict[str, Any]:
     rooms = house.rooms
     parts: dict[str, list[Any]] = {}
-    for key, centre, half, axes in zip(rooms.keys, *rooms.rectangles, strict=True):
-        corners = centre + (np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half) @ axes.T
+    for key, corners in zip(rooms.keys, rooms.corners, strict=True):
         parts.setdefault(key, []).append(shapely.Polygon(corners).buffer(0.001, join_style="mitre"))
     found = []
     for key, polygons in parts.items():

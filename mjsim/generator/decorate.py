@@ -7,10 +7,10 @@ import numpy as np
 
 from mjsim.generator.furniture.appearance import Appearance
 from mjsim.generator.furniture.catalogue import KINDS
-from mjsim.generator.furniture.piece import Piece, Spot, flattened, moved
+from mjsim.generator.furniture.piece import Piece, Point, flattened, moved, moved_point, overlap
 from mjsim.generator.poses import WALL_GAP
-from mjsim.generator.space import BLINDS, PiecePose, Space
-from mjsim.generator.values import BACK, SIDES, HomePlan, Side, Window
+from mjsim.generator.space import BLINDS, PiecePose, Space, footprint
+from mjsim.generator.values import BACK, SIDES, HomePlan, Rectangle, Side, Window
 from mjsim.house.catalogue.generated_names import stream
 
 LOW = 1.15  # maximum height of furniture below a wall decoration, in metres
@@ -62,23 +62,14 @@ def decorate(
         _hang_on_walls(space, use, look, stream(seed, "wall", key))
 
 
-def _overlap(a: Sequence[float], b: Sequence[float]) -> bool:
-    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
-
-
 def _at_wall(space: Space, side: Side, along: float) -> PiecePose:
     x, y = space.room.floor.along(side, along, along, 0.0, 0.0).center
     return PiecePose(x, y, BACK[side], side, along)
 
 
 def _tallest(space: Space, side: Side, start: float, end: float, deep: float) -> float:
-    zone = space.room.floor.along(side, start, end, 0.0, deep)
-    tops = [
-        top
-        for x0, y0, x1, y1, top in space.solids
-        if _overlap((x0, y0, x1, y1), (zone.x0, zone.y0, zone.x1, zone.y1))
-    ]
-    return max(tops, default=0.0)
+    zone = space.room.floor.along(side, start, end, 0.0, deep).spot
+    return max((solid[4] for solid in space.solids if overlap(solid, zone)), default=0.0)
 
 
 def _dress_window(space: Space, window: Window, use: str, look: Appearance, rng: np.random.Generator) -> None:
@@ -114,7 +105,7 @@ def _dress_window(space: Space, window: Window, use: str, look: Appearance, rng:
 def _hang_lamps(space: Space, look: Appearance, rng: np.random.Generator) -> None:
     floor = space.room.floor
     hanging = [
-        moved((0.0, 0.3, 0.0, 0.3), x, y, yaw)[:2]
+        moved_point((0.0, 0.3, 0.0), x, y, yaw)
         for piece, at in space.stood
         for member, x, y, yaw in flattened(piece, at.x, at.y, at.yaw)
         if member.kind == "pendant_lamp"
@@ -129,7 +120,7 @@ def _hang_lamps(space: Space, look: Appearance, rng: np.random.Generator) -> Non
             x = floor.x0 + share * floor.width
         else:
             y = floor.y0 + share * floor.depth
-        if all(max(abs(x - u), abs(y - v)) > LAMPS_APART for u, v in hanging):
+        if all(max(abs(x - u), abs(y - v)) > LAMPS_APART for u, v, _ in hanging):
             space.record(lamp, PiecePose(x, y, 0 if floor.width >= floor.depth else 1, None))
 
 
@@ -139,7 +130,7 @@ def _lay_rug(space: Space, use: str, look: Appearance, rng: np.random.Generator)
         return
     kinds = _RUGS[use]
     kind = kinds[int(rng.integers(len(kinds)))] if space.room.floor.area < LARGE else kinds[0]
-    taken = [*space.solids, *(_spot(piece, at) for piece, at in space.stood if piece.kind == "door_mat")]
+    taken = [*space.solids, *(footprint(piece, at) for piece, at in space.stood if piece.kind == "door_mat")]
     sizes: list[tuple[int, tuple[float, float, float] | None]] = [(0, None), (1, None)]
     if space.room.floor.area > LARGE and kind == "rug":
         sizes = [(0, (2.8, 1.9, 0.0)), (0, (2.2, 1.5, 0.0)), *sizes]
@@ -147,23 +138,18 @@ def _lay_rug(space: Space, use: str, look: Appearance, rng: np.random.Generator)
         rug = KINDS[kind].make(rng, look, smaller=smaller, fit=fit)
         if kind == "bath_mat":
             baths = [(p, at) for p, at in space.stood if p.kind in ("bathtub", "shower")]
-            places = [PiecePose(*_before(p, at), at.turns, None) for p, at in baths]
+            places = [PiecePose(*_before(p, at)[:2], at.turns, None) for p, at in baths]
         else:
             places = _rug_poses(space, rug)
         for place in places:
-            spot = _spot(rug, place)
-            if not any(_overlap(spot, other) for other in taken):
+            spot = footprint(rug, place)
+            if not any(overlap(spot, other) for other in taken):
                 space.record(rug, place)
                 return
 
 
-def _spot(piece: Piece, place: PiecePose) -> Spot:
-    return moved((-piece.size[0] / 2, 0, piece.size[0] / 2, piece.size[1]), place.x, place.y, place.yaw)
-
-
-def _before(piece: Piece, place: PiecePose) -> tuple[float, float]:
-    spot = moved((0, piece.size[1] + 0.04, 0, piece.size[1] + 0.04), place.x, place.y, place.yaw)
-    return spot[0], spot[1]
+def _before(piece: Piece, place: PiecePose) -> Point:
+    return moved_point((0, piece.size[1] + 0.04, 0), place.x, place.y, place.yaw)
 
 
 def _rug_poses(space: Space, rug: Piece) -> list[PiecePose]:
@@ -208,7 +194,7 @@ def _hang_on_walls(space: Space, use: str, look: Appearance, rng: np.random.Gene
 
 def _stretches(space: Space, side: Side, low: float, high: float) -> list[tuple[float, float]]:
     blocked = [(a, b) for s, a, b, _ in space.hung if s == side]
-    deep = space.room.floor.along(side, low, high, 0.0, 0.4)
+    deep = space.room.floor.along(side, low, high, 0.0, 0.4).spot
     tiled = [
         (*moved(part.spot, at.x, at.y, at.yaw), LOW + 1)  # keeps the wall tiles above the worktop free
         for piece, at in space.stood
@@ -216,10 +202,10 @@ def _stretches(space: Space, side: Side, low: float, high: float) -> list[tuple[
         if "kitchen" in piece.kind
     ]
     for x0, y0, x1, y1, top in (*space.solids, *tiled):
-        if top > LOW and _overlap((x0, y0, x1, y1), (deep.x0, deep.y0, deep.x1, deep.y1)):
+        if top > LOW and overlap((x0, y0, x1, y1), deep):
             apart = BESIDE_TILES if top == LOW + 1 else 0.05
-            low_end, high_end = (x0, x1) if side in ("south", "north") else (y0, y1)
-            blocked.append((low_end - apart, high_end + apart))
+            start, end = Rectangle(x0, y0, x1, y1).wall(side)
+            blocked.append((start - apart, end + apart))
     found, at = [], low + WALL_GAP
     for a, b in sorted(blocked):
         if a - at > 0.7:

@@ -56,15 +56,14 @@ def house_files(recipe: Recipe, furnishing: Furnishing, models: Path) -> Mapping
     world = "\n".join([*shell(plan), *_furniture(furnishing)])
     own = {asset.name: asset for placed in furnishing.placements for asset in placed.assets}
     own |= {asset.name: asset for asset in landscapes(recipe.seed)}
-    x0, x1 = min(r.floor.x0 for r in plan.rooms), max(r.floor.x1 for r in plan.rooms)
-    y0, y1 = min(r.floor.y0 for r in plan.rooms), max(r.floor.y1 for r in plan.rooms)
+    (x, y), extent = plan.bounds.center, max(plan.bounds.width, plan.bounds.depth) * 0.62
     style = ET.parse(models / STYLE / "defaults.xml").getroot()
     house = _HEAD.format(
         name=f"generated_{recipe.seed}_{len(plan.rooms)}",
-        x=round((x0 + x1) / 2, 3),
-        y=round((y0 + y1) / 2, 3),
-        extent=round(max(x1 - x0, y1 - y0) * 0.62, 3),
-        clip=round(_SHADOWS / (max(x1 - x0, y1 - y0) * 0.62), 3),
+        x=round(x, 3),
+        y=round(y, 3),
+        extent=round(extent, 3),
+        clip=round(_SHADOWS / extent, 3),
         default=ET.tostring(style[0], encoding="unicode").strip(),
         assets="\n".join(used_materials(world, surfaces(recipe.seed, plan), own.values(), models)),
         world=world,

@@ -32,6 +32,7 @@ from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
 ATTEMPTS = 6
+STRICT_ATTEMPTS = 2  # number of attempts in which each lounge has a sofa, and each studio has a lounge
 SIZES = 4  # number of sizes that are tried for each piece of furniture
 BARE = 0.285  # minimum covered share of a home's floor, below which more furniture is added
 LARGE_ROOMS, LARGE_POINTS = 4, 24  # minimum number of points for objects in homes of that many rooms or more
@@ -192,14 +193,15 @@ class FurnishedHome:
 
     def _put_lounges(self) -> None:
         for space in self.rooms(("living_room", "studio")):
-            if self.put(space, "lounge"):
+            strict = self.attempt < STRICT_ATTEMPTS
+            if self.put(space, "lounge", smallest=SIZES - 1 - strict):
                 continue
-            if space.room.use == "living_room":
+            if strict or space.room.use == "living_room":
                 raise HouseError(
                     f"no place for seats before a television in {space.room.key} of seed {self.seed}"
                 )
-            if not self.put(space, "sofa"):
-                self.put(space, "armchair")
+            for kinds in (("sofa", "armchair"), ("television", "stove")):
+                _ = any(self.put(space, kind) for kind in kinds)
 
     def add_default_furniture(self) -> None:
         """Add default furniture to each room, and more of it if too little of the home's floor is covered."""
@@ -263,8 +265,8 @@ class FurnishedHome:
         return Furnishing(tuple(placements), tuple(self.mounts), self.places)
 
 
-def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> Furnishing:
-    """Place furniture, decoration and bins in a floor plan. Equal arguments give equal results.
+def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> FurnishedHome:
+    """Place furniture, decoration and bins in a floor plan, in several attempts. Equal arguments give equal homes.
 
     Args:
         plan: The floor plan, with rooms, doors and windows.
@@ -275,11 +277,6 @@ def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) ->
     Raises:
         HouseError: A required piece does not fit into this floor plan.
     """
-    return furnish_home(plan, bins, palette, seed).furnishing()
-
-
-def furnish_home(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> FurnishedHome:
-    """Furnish a home in several attempts. Raise `HouseError` if required furniture does not fit."""
     look = draw_appearance(palette, stream(seed, "look"))
     for attempt in range(ATTEMPTS):
         home = FurnishedHome(plan, bins, look, seed, attempt)

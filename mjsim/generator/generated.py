@@ -38,4 +38,4 @@ def furnish_plan(seed: int, plan: HomePlan) -> Furnishing:
     """Furnish a floor plan. Raise `HouseError` if a required piece of furniture does not fit."""
     count = min(4, max(1, round(plan.area / 15) - 1))
     more = stream(seed, "bins").choice(_MORE_BINS, count, replace=False)
-    return furnish(plan, (*_BINS, *sorted(str(key) for key in more)), draw_palette(seed), seed)
+    return furnish(plan, (*_BINS, *sorted(str(key) for key in more)), draw_palette(seed), seed).furnishing()

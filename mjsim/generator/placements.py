@@ -8,7 +8,7 @@ import numpy as np
 from mjsim.generator.default_furniture import SHOWN_NAMES
 from mjsim.generator.furniture.appearance import Appearance
 from mjsim.generator.furniture.piece import BIN_SIZES, Piece, Point, flattened, moved, moved_point
-from mjsim.generator.space import PiecePose, Space
+from mjsim.generator.space import PiecePose, Space, footprint
 from mjsim.generator.values import BinPlacement, HomePlan, Placement, Rectangle
 from mjsim.values.episode import FLOOR_SHARE
 
@@ -30,12 +30,11 @@ def places_for_objects(spaces: Sequence[Space], bins: Sequence[BinPlacement]) ->
     """Return the places on furniture for objects, which are apart from each other and from the bins."""
     found: list[Point] = []
     for space in spaces:
-        for piece, pose in space.stood:
-            for place in (moved_point(at, pose.x, pose.y, pose.yaw) for at in piece.places):
-                apart = all(math.dist(place[:2], other[:2]) >= PLACES_APART for other in found)
-                apart &= all(math.dist(place[:2], placed.position[:2]) >= FROM_BIN for placed in bins)
-                if apart and place[2] <= HIGHEST_PLACE and space.can_take(place):
-                    found.append(place)
+        places = [moved_point(at, p.x, p.y, p.yaw) for piece, p in space.stood for at in piece.places]
+        for place in space.reachable([place for place in places if place[2] <= HIGHEST_PLACE]):
+            apart = all(math.dist(place[:2], other[:2]) >= PLACES_APART for other in found)
+            if apart and all(math.dist(place[:2], placed.position[:2]) >= FROM_BIN for placed in bins):
+                found.append(place)
     return tuple(found)
 
 
@@ -65,7 +64,7 @@ def describe_place(space: Space, piece: Piece, receptacle: str) -> str:
     spot = space.solids[-1]
     nearest = None
     for other, pose in space.stood[:-1]:
-        box = moved((-other.size[0] / 2, 0, other.size[0] / 2, other.size[1]), pose.x, pose.y, pose.yaw)
+        box = footprint(other, pose)
         dx, dy = max(box[0] - spot[2], spot[0] - box[2], 0), max(box[1] - spot[3], spot[1] - box[3], 0)
         gap = math.hypot(dx, dy)
         if gap < 0.8 and (nearest is None or gap < nearest[0]) and other.kind not in BIN_SIZES:

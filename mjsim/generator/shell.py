@@ -18,6 +18,7 @@ from mjsim.generator.values import (
     Door,
     HomePlan,
     Leaf,
+    Rectangle,
     Room,
     Side,
     Window,
@@ -202,9 +203,7 @@ class _RoomShell:
         yield f'<geom class="decor" type="sphere" material="brass" pos="{_n(x)} {_n(y)} 1.02" size="0.032"/>'
 
     def _leaf(self, leaf: Leaf, door: Door) -> Iterator[str]:
-        low, high = leaf.floor.x0, leaf.floor.x1
-        if _NORMAL[leaf.side] == "x":
-            low, high = leaf.floor.y0, leaf.floor.y1
+        low, high = leaf.floor.wall(leaf.side)
         yield self._slab(leaf.side, (low, high), (0.005, door.height - 0.03), (-LEAF_DEPTH, -0.015), "door")
         for up in ((0.2, 0.9), (1.1, 1.8)):
             along = low + 0.13, high - 0.13
@@ -212,18 +211,15 @@ class _RoomShell:
 
 
 def _outside(plan: HomePlan) -> Iterator[str]:
-    x0, x1 = min(r.floor.x0 for r in plan.rooms), max(r.floor.x1 for r in plan.rooms)
-    y0, y1 = min(r.floor.y0 for r in plan.rooms), max(r.floor.y1 for r in plan.rooms)
-    (x, y), w, d = ((x0 + x1) / 2, (y0 + y1) / 2), (x1 - x0) / 2 + 3, (y1 - y0) / 2 + 3
-    for name, kind, at, length in (
-        ("north", "trim_y", (x, y1 + 3), w - 0.02),
-        ("south", "trim_y", (x, y0 - 3), w - 0.02),
-        ("west", "trim_x", (x0 - 3, y), d),
-        ("east", "trim_x", (x1 + 3, y), d),
-    ):
+    around: Rectangle = plan.bounds.grown(3)
+    sides: tuple[Side, ...] = ("north", "south", "west", "east")
+    for side in sides:
+        low, high = around.wall(side)
+        x, y = around.along(side, low, high, 0, 0).center
+        length = (high - low) / 2 - (0.02 if _NORMAL[side] == "y" else 0.0)
         yield (
-            f'<geom name="outside/{name}" group="1" class="{kind}" material="view_{name}" '
-            f'pos="{_n(at[0])} {_n(at[1])} 1.1" size="{_n(length)} 2.6 0.01"/>'
+            f'<geom name="outside/{side}" group="1" class="trim_{_NORMAL[side]}" material="view_{side}" '
+            f'pos="{_n(x)} {_n(y)} 1.1" size="{_n(length)} 2.6 0.01"/>'
         )
 
 

@@ -55,6 +55,12 @@ class PiecePose:
         return self.turns * math.pi / 2
 
 
+def footprint(piece: Piece, pose: PiecePose) -> Spot:
+    """Return the rectangle on the floor that a piece covers, in metres."""
+    w, d, _ = piece.size
+    return moved((-w / 2, 0, w / 2, d), pose.x, pose.y, pose.yaw)
+
+
 @dataclass
 class Space:
     """A room with the furniture that has been placed so far.
@@ -88,27 +94,25 @@ class Space:
         space.drawn = drawn_boxes(room_shell(plan, room))
         for door in plan.doors_of(room.key):
             side, half = door.side_in(room.key), door.width / 2
-            across = floor.depth if side in ("south", "north") else floor.width
-            deep = min(DOORWAY, max(0.75, across - 0.3))
+            deep = min(DOORWAY, max(0.75, space.depth(side) - 0.3))
             zone = floor.along(side, door.center - half - 0.06, door.center + half + 0.06, 0, deep)
-            space.keep.append((zone.x0, zone.y0, zone.x1, zone.y1))
+            space.keep.append(zone.spot)
             for zones, wide in ((space.corners, BESIDE), (space.beside, BESIDE_MIN), (space.ways, 0.0)):
                 zone = floor.along(side, door.center - half - wide, door.center + half + wide, 0, BESIDE)
-                zones.append((zone.x0, zone.y0, zone.x1, zone.y1))
+                zones.append(zone.spot)
             space.doors.append(floor.along(side, door.center, door.center, 0.42, 0.42).center)
             space.hung.append((side, door.center - half - 0.12, door.center + half + 0.12, 0.0))
             if door.leaf is not None and door.leaf.room == room.key:
-                leaf = door.leaf.floor
-                space.solids.append((leaf.x0, leaf.y0, leaf.x1, leaf.y1, door.height))
-                space.hit.append(space.solids[-1][:4])
-                low, high = (leaf.x0, leaf.x1) if door.leaf.side in ("south", "north") else (leaf.y0, leaf.y1)
-                space.hung.append((door.leaf.side, low, high, 0.0))
-                zone = floor.along(door.leaf.side, low, high, 0, BEFORE_LEAF)
-                space.keep.append((zone.x0, zone.y0, zone.x1, zone.y1))
+                leaf = door.leaf
+                space.solids.append((*leaf.floor.spot, door.height))
+                space.hit.append(leaf.floor.spot)
+                low, high = leaf.floor.wall(leaf.side)
+                space.hung.append((leaf.side, low, high, 0.0))
+                space.keep.append(floor.along(leaf.side, low, high, 0, BEFORE_LEAF).spot)
         for window in plan.windows_of(room.key):
             half = window.width / 2 + (LEAVES if room.use in BLINDS else CURTAIN)
             zone = floor.along(window.side, window.center - half, window.center + half, 0, BEFORE_WINDOW)
-            space.windows.append((zone.x0, zone.y0, zone.x1, zone.y1, window.sill))
+            space.windows.append((*zone.spot, window.sill))
             space.hung.append((window.side, window.center - half - 0.05, window.center + half + 0.05, 0.0))
         return space
 
@@ -160,17 +164,20 @@ class Space:
         """Return True if what is drawn of a piece does not overlap anything that is drawn in the room."""
         return not intersect(moved_boxes(piece.drawn, place.x, place.y, place.yaw), self.drawn)
 
-    def can_take(self, place: Point) -> bool:
-        """Return True if a person can take an object from a place on furniture without bending around things."""
+    def reachable(self, places: Sequence[Point]) -> list[Point]:
+        """Return the places on furniture from which a person can take an object without bending around things."""
         floor, free = self.room.floor, self._distance(self.hit, _FINE) > STANDING
         cells = (np.argwhere(free) - 0.5) * _FINE + (floor.x0, floor.y0)
-        away = np.hypot(*(cells - place[:2]).T)
-        if not len(away) or away.min() > WITHIN:
-            return False
-        steps = np.linspace(0.0, 1.0, 9)[:, None]
-        hand = np.hstack([place[:2] + steps * (cells[away.argmin()] - place[:2]), np.full((9, 1), place[2])])
-        low, high = hand + np.array([-0.06, -0.06, 0.02]), hand + np.array([0.06, 0.06, 0.3])
-        return not intersect(np.hstack([low, high]), self.drawn)
+        steps, found = np.linspace(0.0, 1.0, 9)[:, None], []
+        for place in places:
+            away = np.hypot(*(cells - place[:2]).T)
+            if len(away) and away.min() <= WITHIN:
+                way = place[:2] + steps * (cells[away.argmin()] - place[:2])
+                hand = np.hstack([way, np.full((9, 1), place[2])])
+                low, high = hand + np.array([-0.06, -0.06, 0.02]), hand + np.array([0.06, 0.06, 0.3])
+                if not intersect(np.hstack([low, high]), self.drawn):
+                    found.append(place)
+        return found
 
     def record(self, piece: Piece, place: PiecePose) -> None:
         """Record a piece, and what is drawn of it, at its final pose."""
@@ -240,7 +247,7 @@ class Space:
             near: Obstacles of the additional piece that a person must be able to approach.
         """
         floor, spots = self.room.floor, [*self.hit, *spots]
-        _, islands, *_ = _islands(self._distance(spots, _CELL), BODY)
+        _, islands = _islands(self._distance(spots, _CELL), BODY)
         targets: list[tuple[Spot, ...]] = [((x - 0.25, y - 0.25, x + 0.25, y + 0.25),) for x, y in self.doors]
         targets += [(zone,) for zone in (*self.use, *zones)]
         # Extend rectangles along one axis at a time, because their corners would otherwise be too far away.
@@ -257,8 +264,8 @@ class Space:
                 return False
         distance = self._distance(spots, _FINE)
         for radius in (*PERSON_RADII, BODY):
-            _, _, stats, _ = _islands(distance, radius)
-            if (stats[1:, cv2.CC_STAT_AREA] > POCKET / _FINE**2).sum() > 1:
+            count, islands = _islands(distance, radius)
+            if count > 2 and (np.bincount(islands.ravel())[1:] > POCKET / _FINE**2).sum() > 1:
                 return False
         return True
 
@@ -274,8 +281,9 @@ class Space:
         return cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * cell
 
 
-def _islands(distance: Floats, radius: float) -> Any:
-    return cv2.connectedComponentsWithStats((distance > radius).astype(np.uint8), connectivity=4)
+def _islands(distance: Floats, radius: float) -> tuple[int, Any]:
+    """Return the number of connected parts of the floor plus one, and the part of each cell, or 0 for none."""
+    return cv2.connectedComponents((distance > radius).astype(np.uint8), connectivity=4)
 
 
 def _grown(spot: Spot, x: float, y: float) -> Spot:

@@ -46,6 +46,10 @@ class Rectangle:
     def center(self) -> tuple[float, float]:
         return (self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2
 
+    @property
+    def spot(self) -> tuple[float, float, float, float]:
+        return self.x0, self.y0, self.x1, self.y1
+
     def grown(self, by: float) -> "Rectangle":
         """Return the rectangle with all sides moved outwards by a distance, which may be negative."""
         return Rectangle(self.x0 - by, self.y0 - by, self.x1 + by, self.y1 + by)
@@ -154,6 +158,13 @@ class HomePlan:
 
     def windows_of(self, room: str) -> tuple[Window, ...]:
         return tuple(window for window in self.windows if window.room == room)
+
+    @property
+    def bounds(self) -> Rectangle:
+        """The smallest rectangle that contains the floors of all rooms."""
+        floors = [room.floor for room in self.rooms]
+        low = min(f.x0 for f in floors), min(f.y0 for f in floors)
+        return Rectangle(*low, max(f.x1 for f in floors), max(f.y1 for f in floors))
 
     @property
     def area(self) -> float:

@@ -28,9 +28,10 @@ def landscapes(seed: int) -> list[Asset]:
     styles = rng.permutation(len(_STYLES))
     for side, style in zip(("north", "east", "south", "west"), styles, strict=True):
         own = stream(seed, "view", side)
-        y, x = np.mgrid[0:HIGH, 0:WIDE] / np.array([HIGH, WIDE]).reshape(2, 1, 1)
+        rows, columns = np.ogrid[:HIGH, :WIDE]
+        y, x = rows / HIGH, columns / WIDE
         blend = np.clip(y / 0.55, 0, 1)[..., None]
-        image = (1 - blend) * np.array(sky[0]) + blend * np.array(sky[1])
+        image = ((1 - blend) * np.array(sky[0]) + blend * np.array(sky[1])).repeat(WIDE, axis=1)
         clouds = cv2.GaussianBlur(own.standard_normal((HIGH, WIDE)), (0, 0), 18, sigmaY=5)
         image += 0.6 * np.clip(clouds / clouds.std() - 0.9, 0, 1)[..., None] * (1 - image)
         _STYLES[style](own, image, x, y)
@@ -43,29 +44,31 @@ def landscapes(seed: int) -> list[Asset]:
     return found
 
 
-def _ridge(rng: np.random.Generator, x: Plane, height: float | Plane, rough: float) -> Plane:
-    """Return the height of a random ridge for each pixel, as a share of the image from the top."""
+def _ridge(rng: np.random.Generator, x: Plane, height: float, rough: float) -> Plane:
+    """Return the height of a random ridge in each column, as a share of the image from the top."""
+    edge = np.full_like(x, height)
     for k in (1, 2, 4, 9):
-        height = height + rough / k * np.sin(6.3 * k * rng.uniform(1, 2) * x + rng.uniform(0, 6.3))
-    return np.asarray(height)
+        edge += rough / k * np.sin(6.3 * k * rng.uniform(1, 2) * x + rng.uniform(0, 6.3))
+    return edge
 
 
 def _ground(rng: np.random.Generator, image: Image, y: Plane, edge: Plane, colour: Rgb, grain: float) -> None:
     """Fill the image below an edge with a colour and random grain."""
-    noise = cv2.GaussianBlur(rng.standard_normal(y.shape), (0, 0), 1.5)
+    noise = cv2.GaussianBlur(rng.standard_normal((HIGH, WIDE)), (0, 0), 1.5)
     shade = (1 + grain * noise) * (1.1 - 0.3 * np.clip(y - edge, 0, 1))
     image[y > edge] = (np.array(colour) * shade[..., None])[y > edge]
 
 
 def _trees(rng: np.random.Generator, image: Image, x: Plane, y: Plane, low: float, count: int) -> None:
+    leaves = 1 + 0.1 * np.sin(40 * x + 55 * y)
     for _ in range(count):
         u, v, r = rng.uniform(0, 1), low + rng.uniform(-0.02, 0.06), rng.uniform(0.03, 0.09)
-        edge = r * (1 + 0.1 * np.sin(40 * x + 55 * y))
-        crown = np.hypot((x - u) * WIDE / HIGH, (y - v + 1.2 * r) / 1.3) < edge
+        crown = np.hypot((x - u) * WIDE / HIGH, (y - v + 1.2 * r) / 1.3) < r * leaves
         trunk = (np.abs(x - u) < 0.08 * r) & (np.abs(y - v) < 0.8 * r)
         image[trunk] = (0.36, 0.28, 0.2)
         green = np.array(_GREENS[int(rng.integers(len(_GREENS)))])
-        image[crown] = (green * (1.25 - 0.5 * np.clip((y - v + 2.4 * r) / (2.6 * r), 0, 1)[..., None]))[crown]
+        shade = 1.25 - 0.5 * np.clip((y - v + 2.4 * r) / (2.6 * r), 0, 1)
+        image[crown] = green * np.broadcast_to(shade, crown.shape)[crown, None]
 
 
 def _hills(rng: np.random.Generator, image: Image, x: Plane, y: Plane) -> None:

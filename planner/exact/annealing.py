@@ -6,8 +6,9 @@ from numpy.typing import NDArray
 from mjsim.support.kernels import inlined, kernel
 from planner.exact.instance import Instance
 from planner.exact.table import INFINITE
+from planner.solvers import NEVER, Deadline
 
-HOT, COLD = 0.5, 0.01  # first and last temperature, relative to the mean leg length
+SLICE = 10_000  # number of moves between two checks of the deadline, which takes about 15 ms
 
 
 @inlined
@@ -175,57 +176,89 @@ def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArr
     return low
 
 
-def anneal(inst: Instance, seed: int, moves: int) -> tuple[int, NDArray[np.int64]]:
-    return anneal_from(inst, seed, moves, np.arange(inst.home.size), HOT, COLD)
-
-
-@kernel
-def anneal_from(
-    inst: Instance, seed: int, moves: int, first: NDArray[np.int64], hot: float, cold: float
+def anneal(
+    inst: Instance,
+    seed: int,
+    moves: int,
+    first: NDArray[np.int64],
+    hot: float,
+    cold: float,
+    deadline: Deadline = NEVER,
 ) -> tuple[int, NDArray[np.int64]]:
     """Improve an order of picks by simulated annealing. Temperatures are relative to the mean leg length.
 
-    Return the length of the best tour and its order of picks.
+    Return the length of the best tour and its order of picks. After the deadline, no more moves are tried.
+    """
+    n = first.size
+    best, best_order, order = tour_units(inst, first), first, first.copy()
+    state, temperature = np.array([seed], np.uint64), hot * (best / (2.0 * max(1, n)))
+    cooling = (cold / hot) ** (1.0 / moves)
+    for done in range(0, moves if n > 1 else 0, SLICE):
+        if deadline.over():
+            break
+        tried = min(SLICE, moves - done)
+        length, found, temperature = try_moves(inst, state, order, tried, temperature, cooling)
+        if length < best:
+            best, best_order = int(length), found
+    return best, best_order
+
+
+@kernel
+def try_moves(
+    inst: Instance,
+    state: NDArray[np.uint64],
+    order: NDArray[np.int64],
+    moves: int,
+    temperature: float,
+    cooling: float,
+) -> tuple[int, NDArray[np.int64], float]:
+    """Change an order of picks at random, and accept longer tours with a probability that falls with the temperature.
+
+    `state` and `order` are updated. Return the best length, its order, and the temperature at the end.
     """
     n, m = inst.to_bin.shape
-    state = np.array([seed], np.uint64)
-    order = first.copy()
-    costs = np.empty((n + 1, m + 1), np.int64)
-    trial_costs = np.empty((n + 1, m + 1), np.int64)
+    costs, trial_costs = np.empty((n + 1, m + 1), np.int64), np.empty((n + 1, m + 1), np.int64)
     cost = decode(inst, order, 0, costs)
     best, best_order = cost, order.copy()
-    if n < 2:
-        return best, best_order
-    candidate = order.copy()
-    legs = cost / (2.0 * n)
-    temperature = hot * legs
-    cooling = (cold / hot) ** (1.0 / moves)
+    current, candidate = order.copy(), order.copy()
     for _ in range(moves):
         temperature *= cooling
-        low = propose(order, candidate, state)
+        low = propose(current, candidate, state)
         for t in range(low):
             for d in range(m + 1):
                 trial_costs[t, d] = costs[t, d]
         trial = decode(inst, candidate, low, trial_costs)
         if trial <= cost or uniform(state) < np.exp((cost - trial) / temperature):
             cost = trial
-            order, candidate = candidate, order
+            current, candidate = candidate, current
             costs, trial_costs = trial_costs, costs
             if cost < best:
                 best = cost
                 for k in range(n):
-                    best_order[k] = order[k]
-    return best, best_order
+                    best_order[k] = current[k]
+    order[:] = current
+    return best, best_order, temperature
 
 
-def completed(instance: Instance, order: list[int]) -> NDArray[np.int64]:
-    """Return an order of picks, with missing objects inserted where they lengthen the tour least."""
-    n = len(instance.home)
-    missing = sorted(set(range(n)) - set(order))
-    order = [*order, *missing]
-    costs = np.empty((n + 1, len(instance.bins) + 1), np.int64)
-    for k in missing:
-        rest = [j for j in order if j != k]
-        orders = [[*rest[:t], k, *rest[t:]] for t in range(n)]
-        order = min(orders, key=lambda each: decode(instance, np.array(each, dtype=np.int64), 0, costs))
+def tour_units(inst: Instance, order: NDArray[np.int64]) -> int:
+    """Return the length of the shortest tour with a given order of picks, in units."""
+    return int(decode(inst, order, 0, np.empty((len(order) + 1, len(inst.bins) + 1), np.int64)))
+
+
+def inserted(inst: Instance, order: list[int], cycles: list[list[int]]) -> NDArray[np.int64]:
+    """Return an order of picks, in which each cycle is turned and inserted where the tour becomes shortest."""
+    order = [*order, *(k for cycle in cycles for k in cycle)]
+    for cycle in cycles:
+        rest = [k for k in order if k not in cycle]
+        turned = [cycle[k:] + cycle[:k] for k in range(len(cycle))]
+        places = range(len(rest) + 1)
+        order = min(
+            ([*rest[:t], *turn, *rest[t:]] for turn in turned for t in places),
+            key=lambda each: tour_units(inst, np.array(each, dtype=np.int64)),
+        )
     return np.array(order, dtype=np.int64)
+
+
+def completed(inst: Instance, order: list[int]) -> NDArray[np.int64]:
+    """Return an order of picks, with missing objects inserted where they lengthen the tour least."""
+    return inserted(inst, order, [[k] for k in sorted(set(range(len(inst.home))) - set(order))])

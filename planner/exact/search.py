@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.exact.annealing import anneal, anneal_from, completed, tour_actions
+from planner.exact.annealing import anneal, completed, tour_actions
 from planner.exact.expand import PLACE_BITS, expand, offer_roots
 from planner.exact.instance import MAX_SEARCHED, Instance
 from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown, warm_bound
@@ -16,10 +16,13 @@ from planner.exact.warm_start import Start
 from planner.plan import Certificate, Proof
 from planner.solvers import NEVER, Deadline
 
-ANNEALING_MOVES = 10_000
+MOVES, TEMPERATURES = (
+    10_000,
+    (0.5, 0.01),
+)  # annealing of a first tour; temperatures are relative to the mean leg
 # Limits for finding a first plan from a warm start, in about 20 ms
 WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
-WARM_TEMPERATURES = (0.1, 0.02)  # first and last temperature, relative to the mean leg length
+WARM_TEMPERATURES = (0.1, 0.02)
 
 
 def improving_tours(
@@ -62,14 +65,13 @@ def _first_tour(
     instance: Instance, seed: int, work: int, start: Start | None, warm_rows: int
 ) -> tuple[Bound, int, int, list[int], int]:
     if start is None:
-        length, order = anneal(instance, seed, ANNEALING_MOVES)
-        bound = first_bound(instance, int(length))
+        length, order = anneal(instance, seed, MOVES, np.arange(len(instance.home)), *TEMPERATURES)
+        bound = first_bound(instance, length)
     else:
-        length, order = anneal_from(
-            instance, seed, WARM_MOVES, completed(instance, start.order), *WARM_TEMPERATURES
-        )
+        order = completed(instance, start.order)
+        length, order = anneal(instance, seed, WARM_MOVES, order, *WARM_TEMPERATURES)
         bound = warm_bound(instance, start, warm_rows)
-    upper, lower, expanded = int(length), bound.root, 0
+    upper, lower, expanded = length, bound.root, 0
     actions: list[int] = tour_actions(instance, order).tolist()
     if start is not None and work > 0 and len(instance.home) <= MAX_SEARCHED:
         narrow = beam_pass(bound, upper, WARM_WIDTH, work, NEVER)

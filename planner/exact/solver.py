@@ -132,7 +132,7 @@ class ExactSolver:
     ) -> Iterator[Solution]:
         from planner.exact.search import improving_tours  # imported here because it takes 0.5 s to import
 
-        deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)
+        deadline = Deadline.of(limit, started)
         work, cut = limit.work or DEFAULT_WORK, not tabled and self.uses_cuts(instance)
         passes = () if tabled or cut else self.passes
         for solution in improving_tours(instance, seed, work, deadline, passes, start):

@@ -109,7 +109,7 @@ class TaskSearch:
         by_cuts, stopped = self._solver.uses_cuts(instance), limit is not None and limit.stopped
         work = 0 if by_cuts or stopped else self.share(problem)
         if by_cuts:
-            best = self._bounded(problem, instance, seed, deadline(limit))
+            best = self._bounded(problem, instance, seed, Deadline.of(limit))
         else:
             from planner.exact.search import (
                 WARM_ROWS,
@@ -117,7 +117,7 @@ class TaskSearch:
             )  # imported here because it takes 0.5 s
 
             rows, start = HURRIED_ROWS if stopped else WARM_ROWS, self.start(problem, instance)
-            passes, end = self._solver.passes, deadline(limit)
+            passes, end = self._solver.passes, Deadline.of(limit)
             *_, best = improving_tours(instance, seed, work, end, passes, start, rows)
             self.spend(best.expanded)
         visits = to_visits(instance, best.actions, problem.names[:n], problem.names[n:])
@@ -129,31 +129,24 @@ class TaskSearch:
         return plan
 
     def _bounded(self, problem: RoutingProblem, instance: Instance, seed: int, end: Deadline) -> Solution:
-        from planner.exact.annealing import anneal_from, completed, tour_actions
+        from planner.exact.annealing import anneal, completed, tour_actions
         from planner.exact.cuts.branch_and_cut import tours_by_cuts
         from planner.exact.cuts.graph import state_graph
         from planner.exact.cuts.known_cuts import KnownCuts
 
         n, known = len(problem.shipments), self._cuts
         order = completed(instance, self._warm.indices(problem.names[:n]))
-        length, order = anneal_from(instance, seed, MOVES, order, *TEMPERATURES)
+        length, order = anneal(instance, seed, MOVES, order, *TEMPERATURES)
         proof, bound = Certificate(Proof.CUTS, instance.unit, 0, multipliers=(0,) * n), 0
         cuts: tuple[Cut, ...] = ()
         if known is not None:
             root = known.root(problem, instance, state_graph(instance))
             cuts = tuple(cut for cut, _ in root.cuts)
             proof, bound = root.certificate(instance.unit, known.certificate.parts), root.value
-        first = Solution(tour_actions(instance, order).tolist(), min(bound, int(length)), proof)
+        first = Solution(tour_actions(instance, order).tolist(), min(bound, length), proof)
         if bound >= (1 - WIDE) * length or n > self._refined - PAUSE:
             return first
         *_, best = first, *tours_by_cuts(instance, seed, CUTS_WORK, end, first, cuts)
         if best.certificate is not proof:
             self._cuts, self._refined = KnownCuts.of(problem, best.certificate, known), n
         return best
-
-
-def deadline(limit: SolveLimit | None) -> Deadline:
-    """Return the deadline of a search that starts now."""
-    if limit is None:
-        return Deadline(None)
-    return Deadline(None if limit.seconds is None else time.perf_counter() + limit.seconds, limit.stop)

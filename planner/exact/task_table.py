@@ -98,14 +98,12 @@ def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
     left = [before.number[name] for name in problem.names[:n]]
     if any(k >= len(before.shipments) for k in left):
         return None  # an object that is loose now was carried when the table was filled
-    places = [problem.place(k) for k in range(len(problem.names))]
-    visits = [*map(problem.pick, range(n)), *places]
-    here, there = problem.stops(visits)[1:], before.stops(visits)[1:]
+    here, there = (each.stops(problem.visits)[1:] for each in (problem, before))
     if not np.array_equal(problem.distances[np.ix_(here, here)], before.distances[np.ix_(there, there)]):
         return None  # an object was moved
     metric = _metric(filled, problem, here, there)
     bins = sorted({s.delivery for s in before.shipments} | set(before.onboard))
-    bin_of = [bins.index(before.location(visit)) for visit in places]
+    bin_of = [bins.index(location) for location in there[n:]]
     root, root_bin = (
         np.full_like(filled.instance.root, FAR),
         np.full_like(filled.instance.root_bin, FAR),

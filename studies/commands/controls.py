@@ -38,9 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     failures = 0
     for control in controls:
         out = arguments.out / control.name
-        rows, failed = run_with_progress(
-            control.design, out, arguments.workers, arguments.executor, arguments.packed, control.name
-        )
+        rows, failed = run_with_progress(control.design, out, arguments, control.name)
         failures += failed
         error_console().print(
             f"{control.name}: {control.about}; {len(rows)} simulated, {failed} failed: {out}"

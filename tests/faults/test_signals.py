@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 
 import pytest
 from user_code import participant
@@ -53,6 +54,31 @@ def test_signals_are_no_exceptions_while_a_record_is_saved():
     with pytest.raises(Stopped), signals_raised():
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(1)
+
+
+def test_a_signal_is_not_lost_where_python_ignores_exceptions(capsys):
+    class Value:
+        pass
+
+    value, before = Value(), sys.unraisablehook
+    watched = weakref.ref(value, lambda _: os.kill(os.getpid(), signal.SIGINT))
+    with pytest.raises(Stopped), signals_raised():
+        del value
+        assert watched() is None  # the exception of the first signal was ignored
+        time.sleep(5)
+    assert sys.unraisablehook is before
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_other_ignored_exceptions_are_still_reported(monkeypatch):
+    reported = []
+    monkeypatch.setattr(sys, "unraisablehook", reported.append)
+    with signals_raised():
+        value = threading.Event()
+        watched = weakref.ref(value, lambda _: 1 / 0)
+        del value
+        assert watched() is None
+    assert [hook.exc_type for hook in reported] == [ZeroDivisionError]
 
 
 def test_who_does_not_look_is_interrupted_after_a_while(monkeypatch):

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from experiments.analysis.comparison_plot import mark_origin
@@ -131,7 +130,6 @@ def power_of_design(
 def draw(path: Path, found: HomesPower, measure: str) -> None:
     """Plot power against the number of homes, with one line per number of participants."""
     figure = Figure(figsize=(6.0, 3.8), layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.subplots()
     for k, people in enumerate(found.people):
         axes.plot(found.homes, [row[k] for row in found.power], "o-", ms=4, label=f"{people} people")

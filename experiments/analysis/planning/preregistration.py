@@ -21,7 +21,7 @@ from experiments.analysis.study.measures import (
     FILE,
     SURVEY,
     Measures,
-    Survey,
+    SurveyScale,
     decoded_measures,
     read_measures,
 )
@@ -62,7 +62,9 @@ class Preregistration:
     design: Sequence[Mapping[str, Any]]
 
 
-def write_preregistration(study: Path, out: Path, measures: Path = FILE, survey: Survey | None = None) -> str:
+def write_preregistration(
+    study: Path, out: Path, measures: Path = FILE, survey: SurveyScale | None = None
+) -> str:
     """Preregister a study by writing its files to a ZIP file. Return the SHA-256 of that file.
 
     The file contains the survey only if it has other items or another scale than the measures.
@@ -130,7 +132,7 @@ def read_preregistration(path: Path) -> Preregistration:
         exclusions = msgspec.json.decode(files[EXCLUSIONS], type=Exclusions)
         measures = decoded_measures(files[MEASURES])
         if SURVEY in files:
-            measures = measures.of(msgspec.json.decode(files[SURVEY], type=Survey))
+            measures = measures.of(msgspec.json.decode(files[SURVEY], type=SurveyScale))
         versions = msgspec.json.decode(files[VERSIONS], type=dict[str, str])
         design = msgspec.json.decode(files[DESIGN], type=list[dict[str, Any]])
         for trial in design:

@@ -189,11 +189,10 @@ def two_way_squares(
     values: Values,
     first: NDArray[Any],
     second: NDArray[Any],
-    kind: int = 2,
     effects: Iterable[str] = EFFECTS,
 ) -> dict[str, float]:
     """Return the sum of squares for each effect in `effects`. The other arguments are those of `two_way`."""
-    return _squares(_crossed(values, first, second), kind, effects)
+    return _squares(_crossed(values, first, second), 2, effects)
 
 
 def _crossed(values: Values, first: NDArray[Any], second: NDArray[Any]) -> Cells:

@@ -80,7 +80,10 @@ def _equivalence_p(groups: Mapping[str, Values], pair: tuple[str, str], limit: f
 
 
 def _corrected(p: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], float]:
-    return dict(zip(p, map(float, holm(np.array(list(p.values())))), strict=True)) if p else {}
+    from statsmodels.stats.multitest import multipletests
+
+    found = multipletests(list(p.values()), method="holm")[1] if p else ()
+    return dict(zip(p, map(float, found), strict=True))
 
 
 def _compare(
@@ -144,17 +147,6 @@ def tukey_quantile(groups: int, freedom: float) -> float:
 def pooled_deviation(groups: Mapping[str, Values]) -> float:
     squares = sum(float(((v - v.mean()) ** 2).sum()) for v in groups.values())
     return math.sqrt(squares / (people_in(groups) - len(groups)))
-
-
-def holm(p: Values) -> Values:
-    """Correct p-values for multiple comparisons with Holm's method.
-
-    Source: Holm 1979, Scandinavian Journal of Statistics 6.
-    """
-    order = np.argsort(p)
-    found = np.empty(len(p))
-    found[order] = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1)).clip(max=1.0)
-    return found
 
 
 def _quadrature(low: float, high: float) -> tuple[Values, Values]:

@@ -62,7 +62,7 @@ class Equivalence(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     eta_squared: float
 
 
-class Survey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class SurveyScale(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The rating scale of a study's survey: the number of points, and the text of each item by name."""
 
     points: int
@@ -81,7 +81,7 @@ class Measures(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """Return the label of each survey item by the name of its table column."""
         return {LIKERT_PREFIX + name: label for name, label in self.likert.items()}
 
-    def of(self, survey: Survey) -> "Measures":
+    def of(self, survey: SurveyScale) -> "Measures":
         """Return these measures with the scale and with all items of a study's survey."""
         return msgspec.structs.replace(self, likert=survey.items | self.likert, points=survey.points)
 
@@ -99,7 +99,7 @@ def read_measures(path: Path = FILE) -> Measures:
 def with_survey(measures: Measures, folder: Path) -> Measures:
     """Add the survey items from `survey.json`, if `mjsim study collect` wrote this file to the folder."""
     path = folder / SURVEY
-    return measures.of(msgspec.convert(read_json(path), Survey)) if path.is_file() else measures
+    return measures.of(msgspec.convert(read_json(path), SurveyScale)) if path.is_file() else measures
 
 
 def decoded_measures(content: bytes) -> Measures:

@@ -51,6 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.study.plan import plan_of
     from experiments.study.rehearsal.costs import durations, simulate
     from experiments.study.rehearsal.problems import located, problems_of_file, problems_of_length
+    from experiments.study.validation import check_homes
     from experiments.visit.phases import phases_of
     from experiments.web.server.pool import WorkerPool
 
@@ -62,6 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     pool.warm_up()
     with progress_bars(error_console(), "{task.description}") as bars:
         bar = bars.add_task("check", total=None)
+        check_homes(study, lambda name: bars.update(bar, description=f"preparing {name}"))
         with TemporaryDirectory() as folder:
             played = simulate(
                 study, Path(folder), lambda name: bars.update(bar, description=f"simulating {name}")

@@ -46,9 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
     design = read_study(study_path(arguments.study), arguments.people)
     if (code := run_share(design, arguments, "simulated people")) is not None:
         return code
-    rows, failed = run_with_progress(
-        design, arguments.out, arguments.workers, arguments.executor, arguments.packed, "simulated people"
-    )
+    rows, failed = run_with_progress(design, arguments.out, arguments, "simulated people")
     console = error_console()
     if (others := len(rows) + failed - len(design.trials)) > 0:
         console.print(

@@ -1,8 +1,6 @@
 """Collect the data of a study in a table with one row per participant."""
 
-import csv
 import hashlib
-import io
 import os
 import re
 from collections import Counter
@@ -15,10 +13,10 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from experiments.analysis.study.measures import LIKERT_PREFIX, Survey
+from experiments.analysis.study.measures import LIKERT_PREFIX, SurveyScale
 from experiments.analysis.study.measures import SURVEY as SURVEY_FILE
 from experiments.errors import ConfigError, RecordError
-from experiments.record.files import write_json
+from experiments.record.files import csv_text, write_json
 from experiments.record.phases import REHEARSAL, TASK
 from experiments.record.run_directory import is_run, visit_folders
 from experiments.study.data.copies import INDEX
@@ -55,7 +53,7 @@ class Collected:
     texts: Sequence[tuple[str, str, str]]
     unfinished: Mapping[str, int]
     unusable: Mapping[str, str]
-    survey: Survey | None = None
+    survey: SurveyScale | None = None
 
 
 async def collect(study: Study, store: Store, folder: Path) -> Collected:
@@ -89,10 +87,10 @@ def _processes() -> int:
     return os.cpu_count() or 1
 
 
-def survey_of(study: Study) -> Survey:
+def survey_of(study: Study) -> SurveyScale:
     """Return the scale of a study's survey, and the items that are answered on it."""
     section = study.texts[SURVEY]
-    return Survey(
+    return SurveyScale(
         len(section.scale), {item.name: item.text for item in section.items if item.kind == "scale"}
     )
 
@@ -135,11 +133,8 @@ def write_collected(collected: Collected, out: Path) -> Sequence[Path]:
     (out / INDEX).touch(0o600)
     if collected.survey is not None:
         write_json(out / SURVEY_FILE, msgspec.to_builtins(collected.survey))
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("participant", "item", "text"))
-    writer.writerows((person, item, harmless(words)) for person, item, words in collected.texts)
-    write_text_atomically(out / TEXTS, text.getvalue())
+    texts = ((person, item, harmless(words)) for person, item, words in collected.texts)
+    write_text_atomically(out / TEXTS, csv_text(("participant", "item", "text"), texts))
     written = [*write_tables(out, collected.rows), out / TEXTS]
     for path in written:
         path.chmod(0o600)  # the folder may be an older one that others can read

@@ -3,13 +3,13 @@
 import asyncio
 import csv
 import datetime
-import io
 import shutil
 from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 
 from experiments.analysis.study.table import ANALYSIS, FILES
 from experiments.errors import StoreError
+from experiments.record.files import csv_text
 from experiments.study.data.collect import person_name, person_number, visit_name
 from experiments.study.data.copies import DATABASES, Copy, copies, forget_copies
 from experiments.study.data.export import DATA, RUNS
@@ -147,8 +147,6 @@ def _remove_from_csv(path: Path, names: Sequence[str]) -> bool:
         return False
     column = header.index("participant")
     others = [row for row in rows if row[column] not in names]
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([header, *others])
     if found := len(others) < len(rows):
-        write_text_atomically(path, text.getvalue())
+        write_text_atomically(path, csv_text(header, others))
     return found

@@ -1,7 +1,5 @@
 """Export a study as a Psych-DS data set (psych-ds.github.io) with tables, runs and a codebook."""
 
-import csv
-import io
 import re
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,12 +10,13 @@ from typing import Any
 
 from experiments.analysis.study.measures import LIKERT_PREFIX
 from experiments.errors import RecordError
-from experiments.record.files import write_json
+from experiments.record.files import csv_text, write_json
 from experiments.study.data.collect import FREE, Collected, collect, harmless, person_name
 from experiments.study.data.copies import INDEX, note_copy
 from experiments.study.file import Study
 from experiments.trials.table import trial_columns
 from experiments.visit.plan import SURVEY
+from experiments.visit.procedure import ATTEMPTS
 from experiments.visit.store import Answer, PersonRow, Store, TrialRow
 from experiments.visit.texts.items import Item
 from mjsim.support.files import exchange, work_folder, write_text_atomically
@@ -99,7 +98,7 @@ async def export(study: Study, store: Store, folder: Path, out: Path, *, replace
     answers = [row for row in await store.answers() if row.final and row.person_id in people]
     tables: dict[str, Table] = {
         "": found.rows,
-        "phases": await _phases(store, people),
+        "phases": await _phases(store, people, answers),
         "answers": list(_answers(study, answers)),
         "texts": [{"participant": p, "item": item, "text": words} for p, item, words in found.texts],
     }
@@ -134,8 +133,9 @@ def _name(row: TrialRow) -> str:
     return f"p{row.person_id:05d}"
 
 
-async def _phases(store: Store, people: Mapping[int, PersonRow]) -> Table:
+async def _phases(store: Store, people: Mapping[int, PersonRow], answers: Iterable[Answer]) -> Table:
     rows: list[dict[str, Any]] = []
+    rejected = {(row.person_id, row.phase): row.value for row in answers if row.item == ATTEMPTS}
     order: dict[int, int] = {}
     for phase in sorted(await store.phases(), key=lambda row: (row.person_id, row.shown)):
         if phase.person_id not in people:
@@ -147,7 +147,7 @@ async def _phases(store: Store, people: Mapping[int, PersonRow]) -> Table:
                 "phase": phase.name,
                 "order": number,
                 "duration_s": phase.duration_s,
-                "attempts": phase.attempts,
+                "attempts": rejected.get((phase.person_id, phase.name), 0),
                 "reason": phase.reason,
             }
         )
@@ -170,24 +170,19 @@ def _write(out: Path, study: Study, tables: Mapping[str, Table]) -> None:
     short = re.sub("[^a-zA-Z0-9]", "", study.settings.name)
     for name, table in tables.items():
         described = f"_description-{name}" if name else ""
-        write_text_atomically(out / DATA / f"study-{short}{described}_data.csv", csv_text(table))
+        write_text_atomically(out / DATA / f"study-{short}{described}_data.csv", _escaped(table))
     variables = codebook(study, (column for table in tables.values() for column in table[0]))
     rows = [{"name": v.name, "description": v.description, "values": "; ".join(v.levels)} for v in variables]
-    write_text_atomically(out / CODEBOOK, csv_text(rows))
+    write_text_atomically(out / CODEBOOK, _escaped(rows))
     write_json(out / DESCRIPTION, _description(study, variables))
     write_text_atomically(out / IGNORED, f"{RUNS}/\n{CODEBOOK.parent}/\n{INDEX}\n")
     write_text_atomically(out / README, _readme(study, short))
 
 
-def csv_text(table: Table) -> str:
+def _escaped(table: Table) -> str:
     """Format a table as CSV, and escape text that a spreadsheet would evaluate as a formula."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(table[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(
-        {key: harmless(v) if isinstance(v, str) else v for key, v in row.items()} for row in table
-    )
-    return text.getvalue()
+    safe = [{key: harmless(v) if isinstance(v, str) else v for key, v in row.items()} for row in table]
+    return csv_text(list(table[0]), (map(row.get, table[0]) for row in safe))
 
 
 def _description(study: Study, variables: Sequence[Variable]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import httpx
 from experiments.errors import ConfigError, ExperimentError
 from experiments.visit.store.values import PaymentKind
 
-TIMEOUT = 30.0  # response timeout in seconds; other processes may retry after ten minutes
+TIMEOUT = 30.0  # timeout for a complete response in seconds; other processes may retry after ten minutes
 # Maximum number of attempts for a rate-limited request, and maximum delay between two attempts, in seconds
 TRIES, LONGEST_WAIT = 4, 60.0
 LISTED_AFTER = timedelta(minutes=10)
@@ -92,15 +92,11 @@ class Payer(Protocol):
 
 
 class Api:
-    """An HTTP client for the API of a recruitment platform.
+    """An HTTP client for the API of a recruitment platform."""
 
-    Args:
-        timeout: Timeout for a complete response, in seconds.
-    """
-
-    def __init__(self, url: str, headers: Mapping[str, str], timeout: float = TIMEOUT) -> None:
-        self._client = httpx.AsyncClient(base_url=url, headers=headers, timeout=timeout)
-        self._timeout = timeout
+    def __init__(self, url: str, headers: Mapping[str, str]) -> None:
+        self._timeout = TIMEOUT
+        self._client = httpx.AsyncClient(base_url=url, headers=headers, timeout=TIMEOUT)
 
     async def ask(self, method: str, path: str, **request: Any) -> Any:
         """Send a request and return the JSON of the response, or None if it is empty.

@@ -51,10 +51,10 @@ class ConnectPayer:
     listed_after = LISTED_AFTER
     shortest_reason = 1
 
-    def __init__(self, settings: Recruitment, timeout: float | None = None) -> None:
+    def __init__(self, settings: Recruitment) -> None:
         headers = {"X-API-KEY": secret(KEY)}
         url = f"{settings.api_url or API}/api/v1"
-        self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
+        self._api = Api(url, headers)
 
     async def find(self, order: Order) -> str | None:
         """Look for a payment in the status of the assignment or in the sum of its bonuses."""

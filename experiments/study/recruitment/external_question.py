@@ -61,7 +61,7 @@ class ExternalQuestionPayer:
     listed_after = LISTED_AFTER
     shortest_reason = 1
 
-    def __init__(self, settings: Recruitment, timeout: float | None = None) -> None:
+    def __init__(self, settings: Recruitment) -> None:
         if not settings.api_url:
             raise ConfigError("study.recruitment.api_url is empty; set it to where the platform's API is")
         headers = {
@@ -69,7 +69,7 @@ class ExternalQuestionPayer:
             "Content-Type": "application/x-amz-json-1.1",
         }
         url = settings.api_url
-        self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
+        self._api = Api(url, headers)
 
     async def find(self, order: Order) -> str | None:
         """Look for a payment in the status of the assignment, or for its key in the reasons for bonuses."""

@@ -60,10 +60,10 @@ class ProlificPayer:
     listed_after = timedelta(hours=1)
     shortest_reason = 100
 
-    def __init__(self, settings: Recruitment, timeout: float | None = None) -> None:
+    def __init__(self, settings: Recruitment) -> None:
         headers = {"Authorization": f"Token {secret(TOKEN)}"}
         url = f"{settings.api_url or API}/api/v1"
-        self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
+        self._api = Api(url, headers)
         self._screened_out = settings.screened_out
 
     async def find(self, order: Order) -> str | None:

@@ -1,5 +1,6 @@
 """Estimate the cost and the duration of a study, and the effect sizes that it can detect."""
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from experiments.trials.training import training_config
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.visit.phases.base import Phase
+from mjsim.house.compiled.house import MAX_HOUSES
 
 # Time to choose and click an answer, in seconds (Card, Moran and Newell, CACM 23, 1980)
 CHOOSING = 2.65
@@ -38,12 +40,12 @@ class TrialDurations:
 def simulate(study: Study, folder: Path, on_trial: Callable[[str], None]) -> TrialDurations:
     """Simulate some trials of each cell, write their records to a folder, and return the mean durations."""
     trials = [_simulated(cell, study.path) for cell in study.cells]
-    house = House.load(trials[0][0].house)
+    load = functools.lru_cache(MAX_HOUSES)(House.load)
 
     def seconds(name: str, config: TrialConfig) -> float:
         on_trial(name)
         path = folder / f"{name}".replace(" ", "-").replace(",", "")
-        return float(run_trial(config, path, topdown=False, house=house)["simulated_s"])
+        return float(run_trial(config, path, topdown=False, house=load(config.house))["simulated_s"])
 
     tasks = {}
     for cell, own in zip(study.cells, trials, strict=True):

@@ -2,11 +2,11 @@
 
 import asyncio
 import datetime
+import re
 import socket
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, asynccontextmanager, nullcontext
 from dataclasses import dataclass, field, replace
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any, cast
 from urllib.parse import urlencode
@@ -17,7 +17,6 @@ import numpy as np
 import uvicorn
 
 from experiments.analysis.study.table import ANALYSIS
-from experiments.house import House
 from experiments.record.phases import TASK
 from experiments.study.data.analyses import analysis_faults
 from experiments.study.data.collect import collect, write_collected
@@ -26,6 +25,7 @@ from experiments.study.plan import plan_of
 from experiments.study.rehearsal.person import QUEUE, REFUSED, Rehearsed, SimulatedPerson, Surroundings
 from experiments.study.rehearsal.pictures import HELP
 from experiments.study.rehearsal.plan import Leaving, Planned, link_parameters, rehearsed
+from experiments.study.rehearsal.player import homes_in
 from experiments.study.rehearsal.report import STATUS, TABLE
 from experiments.visit.folders import VISITS, VisitFolders
 from experiments.visit.phases.base import FormPhase
@@ -42,8 +42,10 @@ MINIMUM_S = 1.0  # longest minimum duration of a phase in a dry run, in seconds
 TASK_S = 1.0
 PLACES = 10  # factor by which the trials of a cell are repeated so that no participant is turned away
 FACTOR = 1e6  # factor by which reading times are divided
+MARKERS = 900  # number of the first participant for a picture of the markers
 LATE = 999  # number of a participant who times out
 TIMEOUT_S = 400.0  # HTTP timeout in seconds, long enough for the compilation during the first request
+_UNREAD = re.compile(r"<(head|script|noscript)\b.*?</\1>|<[^>]*>", re.DOTALL)  # parts without visible words
 
 # A function that is given the name and URL of a page, and its content if the URL alone does not show it
 Photograph = Callable[[str, str, str], Awaitable[None]]
@@ -80,7 +82,7 @@ async def dry_run(
             base,
             client,
             {phase.name: phase for phase in procedure.phases},
-            House.load(study.cells[0].trial(0).house),
+            homes_in(folders),
             link_parameters(study, platform),
             study.settings.minimum,
             study.settings.limits.attempts,
@@ -90,6 +92,8 @@ async def dry_run(
         walk = _Walk(procedure, around, photograph, server.sessions.limit)
         for planned in _ways(procedure):
             await walk.send(planned)
+        if study.settings.explain_markers:
+            await walk.show_markers([cell.trials[0].assistance for cell in study.cells])
         await walk.show_refusals()
         found = await collect(study, store, folder)
         walk.walked.faults += [
@@ -174,6 +178,25 @@ class _Walk:
         in_a_phase = planned.leaves_in and wanted != "withdrawn"
         await self._photograph(f"{planned.leaves_in}-{wanted}" if in_a_phase else wanted, str(page.url), "")
 
+    async def show_markers(self, conditions: Sequence[str]) -> None:
+        """Take a picture of the task's instructions in each condition. `conditions` has the condition of each cell."""
+        store, plan, around = self._procedure.store, self._procedure.plan, self._around
+        for number, name in enumerate(dict.fromkeys(conditions), MARKERS):
+            one = Rehearsed(number)
+            planned = replace(next(_ways(self._procedure)), number=number)
+            await SimulatedPerson(planned, around, one).begin()
+            person = await store.find(token_hash(one.link.rpartition("/")[2]))
+            if person is None:
+                self.walked.faults.append("a participant who began is not in the database")
+                continue
+            quotas = zip(plan.cells, conditions, strict=True)
+            cells = [replace(quota, wanted=PLACES * (condition == name)) for quota, condition in quotas]
+            await store.assign(person.id, cells, plan.rule, np.random.default_rng(0))
+            await store.finish_phase(person.id, person.phase, TASK, {})
+            await self._photograph(f"{TASK}-{name}", f"{around.base}{one.link}", "")
+            origin = {"Origin": around.base}
+            await around.client.post(f"{one.link}/withdrawal", data={"data": "delete"}, headers=origin)
+
     async def show_refusals(self) -> None:
         """Take pictures of the pages for participants who return elsewhere, time out, or are not admitted."""
         store, recruiter = self._procedure.store, self._procedure.plan.recruiter
@@ -194,25 +217,7 @@ class _Walk:
 
 
 def _words_of(page: str) -> int:
-    text = _Text()
-    text.feed(page)
-    return text.words
-
-
-class _Text(HTMLParser):
-    def __init__(self) -> None:
-        super().__init__()
-        self.words, self._hidden = 0, 0
-
-    def handle_starttag(self, tag: str, attrs: Any) -> None:  # noqa: ARG002 - required by HTMLParser
-        self._hidden += tag in ("head", "script", "noscript")
-
-    def handle_endtag(self, tag: str) -> None:
-        self._hidden -= tag in ("head", "script", "noscript")
-
-    def handle_data(self, data: str) -> None:
-        if not self._hidden:
-            self.words += len(data.split())
+    return len(_UNREAD.sub(" ", page).split())
 
 
 class _Server(uvicorn.Server):

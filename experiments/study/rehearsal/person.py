@@ -64,7 +64,7 @@ class Surroundings:
     base: str
     client: httpx.AsyncClient
     phases: Mapping[str, Phase]
-    house: House
+    home: Callable[[str], House]  # loads the house of the participant with a link
     parameters: Mapping[str, str]  # query parameters of the platform's links, with empty ids
     minimum: Mapping[str, float]  # minimum duration of each phase, in seconds, enforced by the server
     attempts: int | None  # number of attempts allowed at the comprehension check
@@ -198,7 +198,7 @@ class SimulatedPerson:
         breaks += [(moment(trial, rng), "leave")] * leaves
         self._reloaded |= planned.reloads_in == trial
         self._returned |= planned.returns_in == trial
-        player, tab, done = SimulatedPlayer(self._around.house, rng), f"rehearsal-{rng.integers(10**9)}", 0
+        player, tab, done = await self._player(), f"rehearsal-{rng.integers(10**9)}", 0
         for _ in range(TRIES + len(breaks)):
             player.state = None
             at, what = min(breaks, default=(10**9, ""))
@@ -229,11 +229,14 @@ class SimulatedPerson:
             link.cut()
             return tab
         if what == "second page":
-            idle, page = SimulatedPlayer(self._around.house, self._rng), f"second-{tab}"
+            idle, page = await self._player(), f"second-{tab}"
             async with connected(self._around.base, self.rehearsed.link, trial, page, idle) as second:
                 await second.occupied()
             return tab
         return f"rehearsal-{self._rng.integers(10**9)}"
+
+    async def _player(self) -> SimulatedPlayer:
+        return SimulatedPlayer(await asyncio.to_thread(self._around.home, self.rehearsed.link), self._rng)
 
     async def _away(self) -> None:
         await asyncio.sleep(float(self._rng.uniform(0.0, AWAY)) / self._around.factor)

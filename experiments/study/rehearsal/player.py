@@ -1,12 +1,18 @@
 """A simulated player that plays a trial using only the messages that a browser receives."""
 
+import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
+from experiments.errors import RecordError
 from experiments.house import House
+from experiments.record.phases import TASK
+from experiments.visit.folders import VisitFolders
+from experiments.visit.tokens import token_hash
+from mjsim.house.compiled.house import MAX_HOUSES
 from planner.errors import UnreachableError
 
 STEP = 0.04  # duration of a control step, in seconds
@@ -18,6 +24,19 @@ STUCK = 0.05  # A player who moves less than this distance, in metres, in `STUCK
 STUCK_AFTER = 6
 BACKWARDS = 3  # number of inputs for which a stuck player walks backwards
 PRESS_GAP = 15  # shortest time between two key presses, in control steps
+
+
+def homes_in(folders: VisitFolders) -> Callable[[str], House]:
+    """Return a function that loads the house in which the participant with a link plays."""
+    load = functools.lru_cache(MAX_HOUSES)(House.load)
+
+    def home(link: str) -> House:
+        folder = folders.find(token_hash(link.rpartition("/")[2]))
+        if folder is None:
+            raise RecordError(f"the visit of {link} has no folder in {folders.path}")
+        return load(folder.settings(TASK)["house"])
+
+    return home
 
 
 class SimulatedPlayer:

@@ -12,12 +12,13 @@ import httpx
 import msgspec
 
 from experiments.errors import ConfigError, RecordError
-from experiments.house import House
 from experiments.study.file import Study
 from experiments.study.plan import plan_of
 from experiments.study.recruitment import recruiter
 from experiments.study.rehearsal.person import Rehearsed, SimulatedPerson, Surroundings
 from experiments.study.rehearsal.plan import Planned, link_parameters, plan_people
+from experiments.study.rehearsal.player import homes_in
+from experiments.visit.folders import VISITS, VisitFolders
 from experiments.visit.phases import phases_of
 from mjsim.support.files import write_text_atomically
 
@@ -140,13 +141,13 @@ async def _send(
     platform = recruiter(study.settings.recruitment)
     parameters = link_parameters(study, platform)
     phases = {phase.name: phase for phase in phases_of(plan_of(study))}
-    house = House.load(study.cells[0].trial(0).house)
+    home = homes_in(VisitFolders(out / SERVED / VISITS))
     minimum = {name: seconds / settings.factor for name, seconds in study.settings.minimum.items()}
     # Do not keep idle connections, because the client checks every connection before each request.
     limits = httpx.Limits(max_connections=None, max_keepalive_connections=0)
     async with httpx.AsyncClient(base_url=base, timeout=HTTP_TIMEOUT, limits=limits) as client:
         around = Surroundings(
-            base, client, phases, house, parameters, minimum, study.settings.limits.attempts, settings.factor
+            base, client, phases, home, parameters, minimum, study.settings.limits.attempts, settings.factor
         )
         with (out / PEOPLE).open("ab", buffering=0) as kept:
 

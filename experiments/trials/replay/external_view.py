@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from types import TracebackType
 
 import numpy as np
 
@@ -68,7 +67,7 @@ def camera_path(
 
 
 class ExternalViewer:
-    """A viewer that films a session from outside the house. It must be used as a context manager.
+    """A viewer that films a session from outside the house. It must be closed after use.
 
     Args:
         scene: The scene to render.
@@ -98,14 +97,6 @@ class ExternalViewer:
 
     def close(self) -> None:
         self._renderer.close()
-
-    def __enter__(self) -> "ExternalViewer":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def figure(observation: Observation, person: PersonParameters) -> tuple[Marker, ...]:

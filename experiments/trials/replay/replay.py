@@ -1,7 +1,7 @@
 """Replay a recorded run, compare every control step with the record, and film the run in any view."""
 
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -207,7 +207,7 @@ def _open_film(replayer: Replayer, film: ReplayFilm, stack: ExitStack) -> tuple[
         return Filming(renderer, video), video
     camera = camera_path(film.camera, house.bounds, config.width / config.height, film.eye, film.target)
     video = stack.enter_context(VideoWriter(path, width=config.width, height=config.height))
-    return stack.enter_context(ExternalViewer(scene, config, camera, video)), video
+    return stack.enter_context(closing(ExternalViewer(scene, config, camera, video))), video
 
 
 def _as_filmed(directory: Path, frames: str | None) -> bool | None:

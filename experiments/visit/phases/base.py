@@ -22,6 +22,7 @@ Outcome = Literal["next", "no_consent", "screened_out"]
 Answers = Mapping[str, Any]
 FormData = ImmutableMultiDict[str, str]
 """Fields of a submitted form."""
+COUNTED = "counted"  # name under which the answers of the last attempt at the comprehension check are stored
 
 
 @dataclass(frozen=True)
@@ -64,11 +65,13 @@ class Again:
 
     Attributes:
         counts: True if the form counts as an attempt.
+        kept: Values to save with the number of attempts if the form counts.
     """
 
     note: str
     values: Mapping[str, Any] = field(default_factory=dict)
     counts: bool = True
+    kept: Answers = field(default_factory=dict)
 
 
 @runtime_checkable
@@ -203,10 +206,6 @@ class Comprehension(FormPhase):
     submitted twice counts once. Other answers on an old page count as an attempt.
     """
 
-    def __init__(self, plan: VisitPlan, name: str, template: str = "form") -> None:
-        super().__init__(plan, name, template)
-        self._counted: dict[str, Answers] = {}  # answers of each participant's last attempt, by path
-
     def values(self, visitor: Visitor) -> Mapping[str, Any]:
         """Return additional values for the page's template."""
         limit = self._plan.limits.attempts
@@ -222,11 +221,11 @@ class Comprehension(FormPhase):
             return dataclasses.replace(read, counts=False)
         if not any(item.is_wrong(read.answers.get(item.name)) for item in self.items):
             return read
-        again = Again(self.texts["wrong"], {"form": self._form(None, read.answers)})
+        shown = {"form": self._form(None, read.answers)}
+        again = Again(self.texts["wrong"], shown, kept={COUNTED: read.answers})
         is_old = sent.get("attempt", str(visitor.attempts)) != str(visitor.attempts)
-        if is_old and self._counted.get(visitor.path, read.answers) == read.answers:
+        if is_old and visitor.answers.get(COUNTED, read.answers) == read.answers:
             return dataclasses.replace(again, counts=False)
-        self._counted[visitor.path] = read.answers
         limit = self._plan.limits.attempts
         last = limit is not None and visitor.attempts + 1 >= limit
         return Done(read.answers, "screened_out") if last else again

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 from sqlalchemy import Select, bindparam, func, insert, or_, select, update
-from sqlalchemy.ext.asyncio import AsyncConnection
+from sqlalchemy.ext.asyncio import AsyncConnection as Connection
 
 from experiments.errors import StoreError
-from experiments.visit.store.part import StorePart, lock_study, note
+from experiments.visit.store.part import StorePart, lock_study, note, transaction
 from experiments.visit.store.tables import assignment, person, study
 from experiments.visit.store.values import (
     ACTIVE,
@@ -54,8 +54,10 @@ _HOLDERS = (
 class Assignments(StorePart):
     """Store methods that assign participants to the cells of the design."""
 
+    @transaction
     async def assign(
         self,
+        connection: Connection,
         person_id: int,
         cells: Sequence[CellQuota],
         rule: Rule,
@@ -79,34 +81,28 @@ class Assignments(StorePart):
             StoreError: The participation has ended.
         """
         now = now or utc_now()
+        quotas = await lock_study(connection, self._study_id)
+        await self._check_active(connection, person_id, now)
+        before = await place_of(connection, person_id)
+        if before is not None:
+            if before.state != "released":
+                return before
+            if await take_back(connection, self._study_id, before, "held"):
+                return await place_of(connection, person_id)
+        wanted = [quotas.get(str(index), cell.wanted) for index, cell in enumerate(cells)]
+        here = {"study": self._study_id, "since": now - abandoned_after}
+        while True:  # repeat if an inactive participant returned between the two queries
+            taken = await _tally(connection, _TAKEN, here)
+            cell = choose([taken.get(index, 0) for index in range(len(cells))], wanted, rule, rng)
+            if cell is None:
+                return None
+            holders = (await connection.execute(_HOLDERS, {**here, "of": cell})).all()
+            if (place := await _free_place(connection, holders, wanted[cell])) is not None:
+                break
+        await self._give(connection, person_id, (cell, place), cells, rng, now, new=before is None)
+        return await place_of(connection, person_id)
 
-        async def work(connection: AsyncConnection) -> Assignment | None:
-            quotas = await lock_study(connection, self._study_id)
-            await self._check_active(connection, person_id, now)
-            before = await place_of(connection, person_id)
-            if before is not None:
-                if before.state != "released":
-                    return before
-                if await take_back(connection, self._study_id, before, "held"):
-                    return await place_of(connection, person_id)
-            wanted = [quotas.get(str(index), cell.wanted) for index, cell in enumerate(cells)]
-            here = {"study": self._study_id, "since": now - abandoned_after}
-            while True:  # repeat if an inactive participant returned between the two queries
-                taken = await _tally(connection, _TAKEN, here)
-                cell = choose([taken.get(index, 0) for index in range(len(cells))], wanted, rule, rng)
-                if cell is None:
-                    return None
-                holders = (await connection.execute(_HOLDERS, {**here, "of": cell})).all()
-                if (place := await _free_place(connection, holders, wanted[cell])) is not None:
-                    break
-            await self._give(connection, person_id, (cell, place), cells, rng, now, new=before is None)
-            return await place_of(connection, person_id)
-
-        return await self._database.write(work)
-
-    async def room(
-        self, wanted: Sequence[int], first: str, abandoned_after: timedelta, now: datetime | None = None
-    ) -> int:
+    async def room(self, wanted: Sequence[int], first: str, abandoned_after: timedelta) -> int:
         """Return the number of free places minus the number of participants who still need one.
 
         Args:
@@ -114,21 +110,13 @@ class Assignments(StorePart):
             first: Name of the first phase. Participants in this phase are not counted.
             abandoned_after: Period of inactivity after which participants and their places are not counted.
         """
-        since = (now or utc_now()) - abandoned_after
-        mine, there = person.c.study_id == self._study_id, person.c.seen >= since
-        coming = select(func.count()).where(
-            mine, there, person.c.status == "arrived", person.c.phase != first
-        )
-        taken = (
-            select(assignment.c.cell, func.count())
-            .join(person, person.c.id == assignment.c.person_id)
-            .where(mine, assignment.c.active == 1, or_(assignment.c.state == "finished", there))
-            .group_by(assignment.c.cell)
-        )
+        since = utc_now() - abandoned_after
+        mine = person.c.study_id == self._study_id, person.c.status == "arrived"
+        coming = select(func.count()).where(*mine, person.c.phase != first, person.c.seen >= since)
         async with self._database.reading() as connection:
             changed = select(study.c.quotas).where(study.c.id == self._study_id)
             quotas = dict((await connection.execute(changed)).scalar_one())
-            counts = await _tally(connection, taken)
+            counts = await _tally(connection, _TAKEN, {"study": self._study_id, "since": since})
             on_the_way = (await connection.execute(coming)).scalar_one()
         free = (quotas.get(str(cell), count) - counts.get(cell, 0) for cell, count in enumerate(wanted))
         return int(sum(max(0, number) for number in free) - on_the_way)
@@ -144,20 +132,16 @@ class Assignments(StorePart):
         async with self._database.reading() as connection:
             return tuple(Assignment(*row) for row in await connection.execute(query))
 
-    async def set_quota(self, cell: int, wanted: int, who: str, now: datetime | None = None) -> None:
+    @transaction
+    async def set_quota(self, connection: Connection, cell: int, wanted: int, who: str) -> None:
         """Change the target number of participants in a cell. Places that are already assigned are kept."""
         if cell < 0 or wanted < 0:
             raise StoreError(f"Cell {cell} cannot have {wanted} people; both are counted from 0.")
-        now = now or utc_now()
-
-        async def work(connection: AsyncConnection) -> None:
-            quotas = {**await lock_study(connection, self._study_id), str(cell): wanted}
-            await connection.execute(update(study).where(study.c.id == self._study_id).values(quotas=quotas))
-            await note(
-                connection, self._study_id, who, "quota changed", {"cell": cell, "wanted": wanted}, now
-            )
-
-        await self._database.write(work)
+        quotas = {**await lock_study(connection, self._study_id), str(cell): wanted}
+        await connection.execute(update(study).where(study.c.id == self._study_id).values(quotas=quotas))
+        await note(
+            connection, self._study_id, who, "quota changed", {"cell": cell, "wanted": wanted}, utc_now()
+        )
 
     async def counts(self) -> Counts:
         mine = person.c.study_id == self._study_id
@@ -176,7 +160,7 @@ class Assignments(StorePart):
                 cells.setdefault(cell, {})[state] = number
         return Counts(statuses, phases, {cell: CellCount(**states) for cell, states in sorted(cells.items())})
 
-    async def _check_active(self, connection: AsyncConnection, person_id: int, now: datetime) -> None:
+    async def _check_active(self, connection: Connection, person_id: int, now: datetime) -> None:
         mine = {"person": person_id, "study": self._study_id}
         active = await connection.execute(_ACTIVE, {**mine, "seen": now})
         if not active.rowcount:
@@ -186,7 +170,7 @@ class Assignments(StorePart):
 
     async def _give(
         self,
-        connection: AsyncConnection,
+        connection: Connection,
         person_id: int,
         place: tuple[int, int],
         cells: Sequence[CellQuota],
@@ -213,7 +197,7 @@ class Assignments(StorePart):
         await connection.execute(update(person).where(person.c.id == person_id).values(status="assigned"))
 
 
-async def _free_place(connection: AsyncConnection, holders: Sequence[Any], wanted: int) -> int | None:
+async def _free_place(connection: Connection, holders: Sequence[Any], wanted: int) -> int | None:
     taken = {holder.place for holder in holders}
     free = next((place for place in range(wanted) if place not in taken), None)
     if free is not None:
@@ -226,7 +210,7 @@ async def _free_place(connection: AsyncConnection, holders: Sequence[Any], wante
 
 
 async def _tally(
-    connection: AsyncConnection, query: Select[Any], values: Mapping[str, Any] | None = None
+    connection: Connection, query: Select[Any], values: Mapping[str, Any] | None = None
 ) -> dict[Any, int]:
     return {row[0]: row[1] for row in await connection.execute(query, values)}
 
@@ -252,12 +236,12 @@ def choose(counts: Sequence[int], quotas: Sequence[int], rule: Rule, rng: np.ran
     return room[int(rng.integers(len(room)))]
 
 
-async def place_of(connection: AsyncConnection, person_id: int) -> Assignment | None:
+async def place_of(connection: Connection, person_id: int) -> Assignment | None:
     row = (await connection.execute(_PLACE, {"person": person_id})).first()
     return None if row is None else Assignment(*row)
 
 
-async def take_back(connection: AsyncConnection, study_id: int, place: Assignment, state: PlaceState) -> bool:
+async def take_back(connection: Connection, study_id: int, place: Assignment, state: PlaceState) -> bool:
     """Give a released place back to its participant. Return False if another participant has it now."""
     query = select(assignment.c.id).where(
         assignment.c.study_id == study_id,
@@ -271,7 +255,7 @@ async def take_back(connection: AsyncConnection, study_id: int, place: Assignmen
     return True
 
 
-async def set_place(connection: AsyncConnection, person_id: int, state: PlaceState) -> None:
+async def set_place(connection: Connection, person_id: int, state: PlaceState) -> None:
     await connection.execute(
         update(assignment)
         .where(assignment.c.person_id == person_id)

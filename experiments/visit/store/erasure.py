@@ -5,7 +5,7 @@ from datetime import datetime
 from typing import Any
 
 from sqlalchemy import delete, select, update
-from sqlalchemy.ext.asyncio import AsyncConnection
+from sqlalchemy.ext.asyncio import AsyncConnection as Connection
 
 from experiments.errors import StoreError
 from experiments.visit.store import tables
@@ -20,9 +20,7 @@ OWN = (tables.answer, tables.trial, tables.phase, tables.assignment, tables.iden
 class Erasure(StorePart):
     """Store methods that delete participants' data."""
 
-    async def erase(
-        self, person_id: int, who: str, now: datetime | None = None, *, unpaid: bool = False
-    ) -> None:
+    async def erase(self, person_id: int, who: str, *, unpaid: bool = False) -> None:
         """Delete all rows of a participant. The audit log keeps the participant's number and payments.
 
         The caller must delete the data in visit folders, backups and exports. SQLite overwrites deleted rows
@@ -32,9 +30,8 @@ class Erasure(StorePart):
         Raises:
             StoreError: There is no such participant, or a payment is still owed.
         """
-        now = now or utc_now()
 
-        async def work(connection: AsyncConnection) -> None:
+        async def work(connection: Connection) -> None:
             await lock_study(connection, self._study_id)
             mine = (tables.person.c.id == person_id, tables.person.c.study_id == self._study_id)
             if (await connection.execute(select(tables.person.c.id).where(*mine))).first() is None:
@@ -51,7 +48,7 @@ class Erasure(StorePart):
                 await connection.execute(delete(table).where(table.c.person_id == person_id))
             await connection.execute(delete(tables.person).where(*mine))
             details = {"person": person_id, "paid": settled}
-            await note(connection, self._study_id, who, "person erased", details, now)
+            await note(connection, self._study_id, who, "person erased", details, utc_now())
 
         await self._database.write(work)
         await self._database.scrub()
@@ -75,7 +72,7 @@ class Erasure(StorePart):
         """
         now = utc_now()
 
-        async def work(connection: AsyncConnection) -> None:
+        async def work(connection: Connection) -> None:
             for number, name in zip(person_ids, names, strict=True):
                 mine = (tables.person.c.id == number, tables.person.c.study_id == self._study_id)
                 before = (await connection.execute(select(tables.person.c.token_hash).where(*mine))).scalar()

@@ -10,10 +10,10 @@ from datetime import datetime, timedelta
 from typing import Any, get_args
 
 from sqlalchemy import ColumnElement, insert, select
-from sqlalchemy.ext.asyncio import AsyncConnection
+from sqlalchemy.ext.asyncio import AsyncConnection as Connection
 
 from experiments.errors import StoreError
-from experiments.visit.store.part import StorePart, database_now, lock_study
+from experiments.visit.store.part import StorePart, database_now, lock_study, transaction
 from experiments.visit.store.tables import payment, person
 from experiments.visit.store.values import PaymentEvent, PaymentKind
 
@@ -26,8 +26,10 @@ _FIELDS = [column for column in payment.c if column.name != "study_id"]
 class Ledger(StorePart):
     """A ledger of payment events, which are never changed after they have been recorded."""
 
+    @transaction
     async def decide(
         self,
+        connection: Connection,
         person_id: int,
         kind: PaymentKind,
         cents: int,
@@ -51,70 +53,67 @@ class Ledger(StorePart):
         _check(kind, cents, currency)
         same = (person_id, kind, cents, currency)
         values: dict[str, Any] = {"person_id": person_id, "kind": kind, "cents": cents, "currency": currency}
+        events = await self._events(connection, key)
+        if events:
+            first = events[0]
+            if (first.person_id, first.kind, first.cents, first.currency) == same:
+                return False
+            raise StoreError(
+                f"Payment {key!r} is {first.kind} of {first.cents} cents {first.currency} for person "
+                f"{first.person_id}, and stays so: use another key for another payment."
+            )
+        await self._check_person(connection, person_id, kind)
+        await self._add(connection, key, 0, "decided", now, note=note, **values)
+        return True
 
-        async def work(connection: AsyncConnection) -> bool:
-            events = await self._events(connection, key)
-            if events:
-                first = events[0]
-                if (first.person_id, first.kind, first.cents, first.currency) == same:
-                    return False
-                raise StoreError(
-                    f"Payment {key!r} is {first.kind} of {first.cents} cents {first.currency} for person "
-                    f"{first.person_id}, and stays so: use another key for another payment."
-                )
-            await self._check_person(connection, person_id, kind)
-            await self._add(connection, key, 0, "decided", now, note=note, **values)
-            return True
-
-        return await self._database.write(work)
-
-    async def begin_sending(self, key: str, now: datetime | None = None) -> int | None:
+    @transaction
+    async def begin_sending(
+        self, connection: Connection, key: str, now: datetime | None = None
+    ) -> int | None:
         """Record a new attempt to send a payment. Return its number, or None if the payment must not be sent now.
 
         It must not be sent if it has been paid or the outcome of another attempt is unknown. Send the request
         to the platform immediately, with a timeout well below ten minutes. After ten minutes, :meth:`owed`
         returns the payment to other callers, who ask the platform about its key.
         """
+        events = await self._known(connection, key)
+        if events[-1].in_doubt or paid(events):
+            return None
+        attempt = events[-1].attempt + 1
+        await self._add(connection, key, attempt, "sending", now, **_same(events[0]))
+        return attempt
 
-        async def work(connection: AsyncConnection) -> int | None:
-            events = await self._known(connection, key)
-            if events[-1].in_doubt or paid(events):
-                return None
-            attempt = events[-1].attempt + 1
-            await self._add(connection, key, attempt, "sending", now, **_same(events[0]))
-            return attempt
-
-        return await self._database.write(work)
-
+    @transaction
     async def confirm(
-        self, key: str, attempt: int, reference: str, note: str = "", now: datetime | None = None
+        self,
+        connection: Connection,
+        key: str,
+        attempt: int,
+        reference: str,
+        note: str = "",
+        now: datetime | None = None,
     ) -> bool:
         """Record that the platform has made a payment. Return False if this has already been recorded."""
+        events = await self._known(connection, key)
+        if paid(events):
+            return False
+        values = {**_same(events[0]), "reference": reference, "note": note}
+        await self._add(connection, key, attempt, "confirmed", now, **values)
+        return True
 
-        async def work(connection: AsyncConnection) -> bool:
-            events = await self._known(connection, key)
-            if paid(events):
-                return False
-            values = {**_same(events[0]), "reference": reference, "note": note}
-            await self._add(connection, key, attempt, "confirmed", now, **values)
-            return True
-
-        return await self._database.write(work)
-
-    async def fail(self, key: str, attempt: int, note: str, now: datetime | None = None) -> bool:
+    @transaction
+    async def fail(
+        self, connection: Connection, key: str, attempt: int, note: str, now: datetime | None = None
+    ) -> bool:
         """Record that an attempt has definitely failed. Return False if it is not the current attempt.
 
         Never call this after a timeout or a lost connection, because the platform may have paid.
         """
-
-        async def work(connection: AsyncConnection) -> bool:
-            events = await self._known(connection, key)
-            if (events[-1].event, events[-1].attempt) != ("sending", attempt):
-                return False
-            await self._add(connection, key, attempt, "failed", now, note=note, **_same(events[0]))
-            return True
-
-        return await self._database.write(work)
+        events = await self._known(connection, key)
+        if (events[-1].event, events[-1].attempt) != ("sending", attempt):
+            return False
+        await self._add(connection, key, attempt, "failed", now, note=note, **_same(events[0]))
+        return True
 
     async def owed(
         self, now: datetime | None = None, in_doubt_after: timedelta = IN_DOUBT_AFTER
@@ -142,18 +141,18 @@ class Ledger(StorePart):
         async with self._database.reading() as connection:
             return tuple(await events_of(connection, *which))
 
-    async def _known(self, connection: AsyncConnection, key: str) -> Sequence[PaymentEvent]:
+    async def _known(self, connection: Connection, key: str) -> Sequence[PaymentEvent]:
         events = await self._events(connection, key)
         if not events:
             raise StoreError(f"No payment {key!r} was decided: decide it first.")
         return events
 
-    async def _events(self, connection: AsyncConnection, key: str) -> Sequence[PaymentEvent]:
+    async def _events(self, connection: Connection, key: str) -> Sequence[PaymentEvent]:
         """Lock the study so that no other process can add events, and return the events of a payment."""
         await lock_study(connection, self._study_id)
         return await events_of(connection, payment.c.study_id == self._study_id, payment.c.key == key)
 
-    async def _check_person(self, connection: AsyncConnection, person_id: int, kind: PaymentKind) -> None:
+    async def _check_person(self, connection: Connection, person_id: int, kind: PaymentKind) -> None:
         known = select(person.c.id).where(person.c.id == person_id, person.c.study_id == self._study_id)
         if (await connection.execute(known)).first() is None:
             raise StoreError(f"There is no person {person_id} in this study to be paid.")
@@ -164,7 +163,7 @@ class Ledger(StorePart):
 
     async def _add(
         self,
-        connection: AsyncConnection,
+        connection: Connection,
         key: str,
         attempt: int,
         event: str,
@@ -200,7 +199,7 @@ def _same(event: PaymentEvent) -> dict[str, Any]:
     }
 
 
-async def events_of(connection: AsyncConnection, *which: ColumnElement[bool]) -> Sequence[PaymentEvent]:
+async def events_of(connection: Connection, *which: ColumnElement[bool]) -> Sequence[PaymentEvent]:
     query = select(*_FIELDS).where(*which).order_by(payment.c.id)
     return [PaymentEvent(*row) for row in await connection.execute(query)]
 

@@ -6,10 +6,10 @@ from datetime import datetime
 from typing import Any
 
 from sqlalchemy import ColumnElement, bindparam, delete, insert, select, update
-from sqlalchemy.ext.asyncio import AsyncConnection
+from sqlalchemy.ext.asyncio import AsyncConnection as Connection
 
 from experiments.errors import StoreError
-from experiments.visit.store.part import StorePart, new_id, note
+from experiments.visit.store.part import StorePart, new_id, note, transaction
 from experiments.visit.store.tables import answer, person
 from experiments.visit.store.tables import identity as ids
 from experiments.visit.store.values import PersonRow, Status, utc_now
@@ -34,8 +34,10 @@ _FIND = select(*_FIELDS).where(
 class People(StorePart):
     """Store methods for participants and their platform ids."""
 
+    @transaction
     async def arrive(
         self,
+        connection: Connection,
         platform: str,
         key: str | None,
         identity: Mapping[str, str],
@@ -56,31 +58,27 @@ class People(StorePart):
         """
         now = now or utc_now()
         same = person.c.token_hash == token_hash if key is None else person.c.platform_key == key
-
-        async def work(connection: AsyncConnection) -> PersonRow:
-            known = (await connection.execute(self._select(same))).first()
-            if known is not None:
-                found = replace(PersonRow(*known), returning=True)
-                if found.active:  # ids change if a participant returns the task and accepts it again
-                    mine = ids.c.person_id == found.id
-                    await connection.execute(update(ids).where(mine).values(ids=dict(identity)))
-                return found
-            values = {
-                "study_id": self._study_id,
-                "token_hash": token_hash,
-                "platform": platform,
-                "platform_key": key,
-                "status": "arrived",
-                "phase": phase,
-                "created": now,
-                "seen": now,
-                "delete_wanted": False,
-            }
-            number = new_id(await connection.execute(insert(person), values))
-            await connection.execute(insert(ids), {"person_id": number, "ids": dict(identity)})
-            return PersonRow(number, token_hash, platform, "arrived", phase, now, now, False)
-
-        return await self._database.write(work)
+        known = (await connection.execute(self._select(same))).first()
+        if known is not None:
+            found = replace(PersonRow(*known), returning=True)
+            if found.active:  # ids change if a participant returns the task and accepts it again
+                mine = ids.c.person_id == found.id
+                await connection.execute(update(ids).where(mine).values(ids=dict(identity)))
+            return found
+        values = {
+            "study_id": self._study_id,
+            "token_hash": token_hash,
+            "platform": platform,
+            "platform_key": key,
+            "status": "arrived",
+            "phase": phase,
+            "created": now,
+            "seen": now,
+            "delete_wanted": False,
+        }
+        number = new_id(await connection.execute(insert(person), values))
+        await connection.execute(insert(ids), {"person_id": number, "ids": dict(identity)})
+        return PersonRow(number, token_hash, platform, "arrived", phase, now, now, False)
 
     async def find(self, token_hash: str) -> PersonRow | None:
         """Return the participant whose link has this token hash, or None."""
@@ -111,33 +109,27 @@ class People(StorePart):
         async with self._database.reading() as connection:
             return dict((await connection.execute(query)).scalar() or {})
 
-    async def set_known(self, known: Mapping[int, bool], who: str) -> None:
+    @transaction
+    async def set_known(self, connection: Connection, known: Mapping[int, bool], who: str) -> None:
         """Record if the recruitment platform knows each participant, as the answer `known` in `recruitment`."""
         now = utc_now()
         given = {"phase": "recruitment", "item": "known", "given": now, "final": True}
+        mine = (
+            answer.c.person_id.in_(known),
+            *(answer.c[name] == given[name] for name in ("phase", "item")),
+        )
+        await connection.execute(delete(answer).where(*mine))
+        for number, value in known.items():
+            await connection.execute(insert(answer), {"person_id": number, "value": value, **given})
+        unknown = [number for number, value in known.items() if not value]
+        await note(connection, self._study_id, who, "participants reconciled", {"unknown": unknown}, now)
 
-        async def work(connection: AsyncConnection) -> None:
-            mine = (
-                answer.c.person_id.in_(known),
-                *(answer.c[name] == given[name] for name in ("phase", "item")),
-            )
-            await connection.execute(delete(answer).where(*mine))
-            for number, value in known.items():
-                await connection.execute(insert(answer), {"person_id": number, "value": value, **given})
-            unknown = [number for number, value in known.items() if not value]
-            await note(connection, self._study_id, who, "participants reconciled", {"unknown": unknown}, now)
-
-        await self._database.write(work)
-
-    async def beat(self, person_id: int, now: datetime | None = None) -> None:
+    @transaction
+    async def beat(self, connection: Connection, person_id: int, now: datetime | None = None) -> None:
         """Record that a participant is active, so that the participant's place is not given away."""
         now = now or utc_now()
-
-        async def work(connection: AsyncConnection) -> None:
-            late = person.c.seen < now
-            await connection.execute(update(person).where(person.c.id == person_id, late).values(seen=now))
-
-        await self._database.write(work)
+        late = person.c.seen < now
+        await connection.execute(update(person).where(person.c.id == person_id, late).values(seen=now))
 
     def _select(self, *which: ColumnElement[bool]) -> Any:
         return select(*_FIELDS).where(person.c.study_id == self._study_id, *which)

@@ -6,10 +6,10 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Select, Table, bindparam, insert, select, update
 from sqlalchemy import delete as delete_rows
-from sqlalchemy.ext.asyncio import AsyncConnection
+from sqlalchemy.ext.asyncio import AsyncConnection as Connection
 
 from experiments.visit.store.assignments import place_of, set_place, take_back
-from experiments.visit.store.part import StorePart, lock_study
+from experiments.visit.store.part import StorePart, lock_study, transaction
 from experiments.visit.store.tables import answer, identity, person, trial
 from experiments.visit.store.tables import phase as phases
 from experiments.visit.store.values import ACTIVE, Answer, PhaseRow, Status, TrialRow, utc_now
@@ -43,30 +43,29 @@ _ROWS_OF_ONE = {table: rows.where(table.c.person_id == bindparam("person")) for 
 class Phases(StorePart):
     """The part of the store for phases, answers and trials."""
 
-    async def show_phase(self, person_id: int, name: str, now: datetime | None = None) -> PhaseRow:
+    @transaction
+    async def show_phase(
+        self, connection: Connection, person_id: int, name: str, now: datetime | None = None
+    ) -> PhaseRow:
         """Record when a phase was first shown to a participant, and return its row."""
         now = now or utc_now()
+        row = await _phase(connection, person_id, name)
+        if row is None:
+            new = {"person_id": person_id, "name": name, "shown": now}
+            await connection.execute(insert(phases), new)
+            return PhaseRow(person_id, name, now, None, None, None, None)
+        return row
 
-        async def work(connection: AsyncConnection) -> PhaseRow:
-            row = await _phase(connection, person_id, name)
-            if row is None:
-                new = {"person_id": person_id, "name": name, "shown": now}
-                await connection.execute(insert(phases), new)
-                return PhaseRow(person_id, name, now, None, None, None, None)
-            return row
-
-        return await self._database.write(work)
-
+    @transaction
     async def finish_phase(
         self,
+        connection: Connection,
         person_id: int,
         name: str,
         next_name: str,
         answers: Mapping[str, Any] | None = None,
         reason: str | None = None,
         *,
-        duration_s: float | None = None,
-        attempts: int | None = None,
         status: Status | None = None,
         now: datetime | None = None,
     ) -> bool:
@@ -77,58 +76,57 @@ class Phases(StorePart):
         Args:
             answers: Answers by item, which replace answers saved earlier.
             reason: Reason why the phase ended, if several are possible.
-            duration_s: Duration of the phase in seconds. The default is the time since it was first shown.
             status: Final status, such as `finished`, if this phase ends the visit.
         """
         now = now or utc_now()
+        if status is not None:
+            await lock_study(connection, self._study_id)
+        moved = await connection.execute(
+            _IN_PHASE, {"person": person_id, "from": name, "phase": next_name, "seen": now}
+        )
+        if not moved.rowcount:
+            return False
+        await _save(connection, person_id, name, answers or {}, now, final=True)
+        await _end_phase(connection, person_id, name, now, reason)
+        if status is not None:
+            await end(connection, self._study_id, person_id, status)
+        return True
 
-        async def work(connection: AsyncConnection) -> bool:
-            if status is not None:
-                await lock_study(connection, self._study_id)
-            moved = await connection.execute(
-                _IN_PHASE, {"person": person_id, "from": name, "phase": next_name, "seen": now}
-            )
-            if not moved.rowcount:
-                return False
-            await _save(connection, person_id, name, answers or {}, now, final=True)
-            how = {"duration_s": duration_s, "attempts": attempts, "reason": reason}
-            await _end_phase(connection, person_id, name, now, how)
-            if status is not None:
-                await end(connection, self._study_id, person_id, status)
-            return True
-
-        return await self._database.write(work)
-
+    @transaction
     async def save_answers(
-        self, person_id: int, phase: str, values: Mapping[str, Any], now: datetime | None = None
+        self,
+        connection: Connection,
+        person_id: int,
+        phase: str,
+        values: Mapping[str, Any],
+        now: datetime | None = None,
     ) -> bool:
         """Save or replace answers of the current phase. Return False if the participant is in another phase.
 
         The answers of a phase cannot be changed after its end.
         """
         now = now or utc_now()
+        current = await connection.execute(_IN_PHASE, {"person": person_id, "from": phase, "seen": now})
+        if not current.rowcount:
+            return False
+        await _save(connection, person_id, phase, values, now)
+        return True
 
-        async def work(connection: AsyncConnection) -> bool:
-            current = await connection.execute(_IN_PHASE, {"person": person_id, "from": phase, "seen": now})
-            if not current.rowcount:
-                return False
-            await _save(connection, person_id, phase, values, now)
-            return True
-
-        return await self._database.write(work)
-
+    @transaction
     async def finish_trial(
-        self, person_id: int, phase: str, folder: str, ended: str, now: datetime | None = None
+        self,
+        connection: Connection,
+        person_id: int,
+        phase: str,
+        folder: str,
+        ended: str,
+        now: datetime | None = None,
     ) -> None:
         """Record that a trial has ended. `folder` is its run directory, relative to the study's folder."""
         values = {"folder": folder, "ended": ended, "finished": now or utc_now()}
-
-        async def work(connection: AsyncConnection) -> None:
-            same = (trial.c.person_id == person_id, trial.c.phase == phase)
-            if not (await connection.execute(update(trial).where(*same).values(**values))).rowcount:
-                await connection.execute(insert(trial).values(person_id=person_id, phase=phase, **values))
-
-        await self._database.write(work)
+        same = (trial.c.person_id == person_id, trial.c.phase == phase)
+        if not (await connection.execute(update(trial).where(*same).values(**values))).rowcount:
+            await connection.execute(insert(trial).values(person_id=person_id, phase=phase, **values))
 
     async def phases(self, person_id: int | None = None) -> tuple[PhaseRow, ...]:
         """Return the phases of one or all participants, in the order in which they were shown."""
@@ -154,26 +152,27 @@ class Phases(StorePart):
             return (await connection.execute(query.where(*which) if which else query, values)).all()
 
 
-async def _phase(connection: AsyncConnection, person_id: int, name: str) -> PhaseRow | None:
+async def _phase(connection: Connection, person_id: int, name: str) -> PhaseRow | None:
     row = (await connection.execute(_PHASE, {"person": person_id, "phase": name})).first()
     return None if row is None else PhaseRow(*row)
 
 
 async def _end_phase(
-    connection: AsyncConnection, person_id: int, name: str, now: datetime, how: dict[str, Any]
+    connection: Connection, person_id: int, name: str, now: datetime, reason: str | None
 ) -> None:
     row = await _phase(connection, person_id, name)
-    if how["duration_s"] is None:
-        how["duration_s"] = max(0.0, (now - row.shown).total_seconds()) if row else 0.0
+    passed = max(0.0, (now - row.shown).total_seconds()) if row else 0.0
+    ending = {"ended": now, "duration_s": passed, "reason": reason}
     if row is None:  # the phase has never been shown
-        new = {"person_id": person_id, "name": name, "shown": now, "ended": now, **how}
-        await connection.execute(insert(phases), new)
-        return
-    await connection.execute(_END, {"person": person_id, "which": name, "ended": now, **how})
+        await connection.execute(
+            insert(phases), {"person_id": person_id, "name": name, "shown": now, **ending}
+        )
+    else:
+        await connection.execute(_END, {"person": person_id, "which": name, **ending})
 
 
 async def _save(
-    connection: AsyncConnection,
+    connection: Connection,
     person_id: int,
     phase: str,
     values: Mapping[str, Any],
@@ -203,66 +202,61 @@ async def _save(
 class Endings(StorePart):
     """Store methods that end visits."""
 
-    async def finish(self, person_id: int, status: Status = "finished", now: datetime | None = None) -> bool:
+    @transaction
+    async def finish(
+        self, connection: Connection, person_id: int, status: Status = "finished", now: datetime | None = None
+    ) -> bool:
         """Set the final status of an active participant. Return False if the participant was not active.
 
         The participant's place is kept if the status is `finished`, and released otherwise.
         """
         now = now or utc_now()
+        await lock_study(connection, self._study_id)
+        active = person.c.status.in_(ACTIVE)
+        ended = await connection.execute(
+            update(person).where(person.c.id == person_id, active).values(seen=now)
+        )
+        if not ended.rowcount:
+            return False
+        await end(connection, self._study_id, person_id, status)
+        return True
 
-        async def work(connection: AsyncConnection) -> bool:
-            await lock_study(connection, self._study_id)
-            active = person.c.status.in_(ACTIVE)
-            ended = await connection.execute(
-                update(person).where(person.c.id == person_id, active).values(seen=now)
-            )
-            if not ended.rowcount:
-                return False
-            await end(connection, self._study_id, person_id, status)
-            return True
-
-        return await self._database.write(work)
-
-    async def time_out(self, before: datetime) -> int:
+    @transaction
+    async def time_out(self, connection: Connection, before: datetime) -> int:
         """Time out all participants who have been inactive since `before`, and return their number."""
         gone = (person.c.study_id == self._study_id, person.c.status.in_(ACTIVE), person.c.seen < before)
+        await lock_study(connection, self._study_id)
+        found = (await connection.execute(select(person.c.id).where(*gone))).scalars().all()
+        for person_id in found:
+            await end(connection, self._study_id, person_id, "timed_out")
+        return len(found)
 
-        async def work(connection: AsyncConnection) -> int:
-            await lock_study(connection, self._study_id)
-            found = (await connection.execute(select(person.c.id).where(*gone))).scalars().all()
-            for person_id in found:
-                await end(connection, self._study_id, person_id, "timed_out")
-            return len(found)
-
-        return await self._database.write(work)
-
-    async def withdraw(self, person_id: int, delete: bool, now: datetime | None = None) -> bool:
+    @transaction
+    async def withdraw(
+        self, connection: Connection, person_id: int, delete: bool, now: datetime | None = None
+    ) -> bool:
         """Withdraw a participant, who may already have finished the study. Return False if nothing changed.
 
         With `delete`, the answers are deleted immediately and the place is released. The number and platform ids are
         kept until all payments are made and :meth:`Store.erase` is called.
         """
         now = now or utc_now()
-
-        async def work(connection: AsyncConnection) -> bool:
-            await lock_study(connection, self._study_id)
-            mine = person.c.id == person_id
-            may = person.c.status.in_((*ACTIVE, "finished"))
-            if delete:
-                may = person.c.delete_wanted.is_(False)
-            values = {"seen": now, "delete_wanted": True} if delete else {"seen": now}
-            if not (await connection.execute(update(person).where(mine, may).values(**values))).rowcount:
-                return False
-            await end(connection, self._study_id, person_id, "withdrawn", keep_finished=not delete)
-            if delete:
-                await connection.execute(delete_rows(answer).where(answer.c.person_id == person_id))
-            return True
-
-        return await self._database.write(work)
+        await lock_study(connection, self._study_id)
+        mine = person.c.id == person_id
+        may = person.c.status.in_((*ACTIVE, "finished"))
+        if delete:
+            may = person.c.delete_wanted.is_(False)
+        values = {"seen": now, "delete_wanted": True} if delete else {"seen": now}
+        if not (await connection.execute(update(person).where(mine, may).values(**values))).rowcount:
+            return False
+        await end(connection, self._study_id, person_id, "withdrawn", keep_finished=not delete)
+        if delete:
+            await connection.execute(delete_rows(answer).where(answer.c.person_id == person_id))
+        return True
 
 
 async def end(
-    connection: AsyncConnection, study_id: int, person_id: int, status: Status, *, keep_finished: bool = True
+    connection: Connection, study_id: int, person_id: int, status: Status, *, keep_finished: bool = True
 ) -> None:
     """Set a participant's final status, and keep or release their place. The study must be locked."""
     await connection.execute(update(person).where(person.c.id == person_id).values(status=status))

@@ -7,10 +7,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, get_args
 
 from sqlalchemy import insert, select, update
-from sqlalchemy.ext.asyncio import AsyncConnection
+from sqlalchemy.ext.asyncio import AsyncConnection as Connection
 
 from experiments.errors import StoreError
 from experiments.visit.store.engine import Database
+from experiments.visit.store.part import transaction
 from experiments.visit.store.tables import login, researcher
 from experiments.visit.store.values import Researcher, Role, utc_now
 
@@ -48,7 +49,7 @@ class Researchers:
         values = {"name": name, "role": _known(role), "disabled": False, "created": now or utc_now()}
         values["password"] = await self._hash(password)
 
-        async def work(connection: AsyncConnection) -> Researcher:
+        async def work(connection: Connection) -> Researcher:
             same = select(researcher.c.id).where(researcher.c.name == name)
             if (await connection.execute(same)).first() is not None:
                 raise StoreError(f"There is a researcher {name!r} already: use another name.")
@@ -97,7 +98,7 @@ class Researchers:
         if disabled is not None:
             values["disabled"] = disabled
 
-        async def work(connection: AsyncConnection) -> None:
+        async def work(connection: Connection) -> None:
             who = (
                 await connection.execute(select(researcher.c.id).where(researcher.c.name == name))
             ).scalar()
@@ -110,16 +111,18 @@ class Researchers:
 
         await self._database.write(work)
 
+    @transaction
     async def log_in(
-        self, researcher_id: int, token_hash: str, expires: datetime, now: datetime | None = None
+        self,
+        connection: Connection,
+        researcher_id: int,
+        token_hash: str,
+        expires: datetime,
+        now: datetime | None = None,
     ) -> None:
         """Record a login. Only the SHA-256 of the login's token is stored."""
         values = {"researcher_id": researcher_id, "token_hash": token_hash, "expires": expires}
-
-        async def work(connection: AsyncConnection) -> None:
-            await connection.execute(insert(login).values(**values, created=now or utc_now()))
-
-        await self._database.write(work)
+        await connection.execute(insert(login).values(**values, created=now or utc_now()))
 
     async def who(self, token_hash: str, now: datetime | None = None) -> Researcher | None:
         """Return the researcher who is logged in with this token hash, or None."""
@@ -133,13 +136,10 @@ class Researchers:
             row = (await connection.execute(query)).first()
         return None if row is None else Researcher(*row)
 
-    async def log_out(self, token_hash: str, now: datetime | None = None) -> None:
-
-        async def work(connection: AsyncConnection) -> None:
-            mine = (login.c.token_hash == token_hash, login.c.revoked.is_(None))
-            await connection.execute(update(login).where(*mine).values(revoked=now or utc_now()))
-
-        await self._database.write(work)
+    @transaction
+    async def log_out(self, connection: Connection, token_hash: str, now: datetime | None = None) -> None:
+        mine = (login.c.token_hash == token_hash, login.c.revoked.is_(None))
+        await connection.execute(update(login).where(*mine).values(revoked=now or utc_now()))
 
     async def _row(self, name: str) -> Any:
         async with self._database.reading() as connection:

@@ -3,12 +3,11 @@
 import sqlite3
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import closing, suppress
-from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
 
 from sqlalchemy import insert, select, update
-from sqlalchemy.ext.asyncio import AsyncConnection
+from sqlalchemy.ext.asyncio import AsyncConnection as Connection
 
 from experiments.errors import StoreError
 from experiments.visit.store.assignments import Assignments
@@ -17,7 +16,7 @@ from experiments.visit.store.engine import Database
 from experiments.visit.store.erasure import Erasure
 from experiments.visit.store.hosts import Hosts
 from experiments.visit.store.ledger import Ledger
-from experiments.visit.store.part import new_id, note
+from experiments.visit.store.part import new_id, note, transaction
 from experiments.visit.store.people import People
 from experiments.visit.store.phases import Endings, Phases
 from experiments.visit.store.researchers import PASSWORD_MEMORY_KIB, Researchers
@@ -95,26 +94,18 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         quotas = {int(cell): wanted for cell, wanted in row.quotas.items()}
         return StudyRow(row.id, row.name, row.file_hash, row.state, row.created, quotas)
 
-    async def set_state(self, state: StudyState, who: str, now: datetime | None = None) -> None:
+    @transaction
+    async def set_state(self, connection: Connection, state: StudyState, who: str) -> None:
         """Open, pause or close the study."""
-        now = now or utc_now()
+        await connection.execute(update(study).where(study.c.id == self._study_id).values(state=state))
+        await note(connection, self._study_id, who, f"study {state}", {}, utc_now())
 
-        async def work(connection: AsyncConnection) -> None:
-            await connection.execute(update(study).where(study.c.id == self._study_id).values(state=state))
-            await note(connection, self._study_id, who, f"study {state}", {}, now)
-
-        await self._database.write(work)
-
+    @transaction
     async def audit(
-        self, who: str, action: str, details: Mapping[str, Any] | None = None, now: datetime | None = None
+        self, connection: Connection, who: str, action: str, details: Mapping[str, Any] | None = None
     ) -> None:
         """Add an entry to the audit log. Refer to participants by number, never by platform id."""
-        now = now or utc_now()
-
-        async def work(connection: AsyncConnection) -> None:
-            await note(connection, self._study_id, who, action, details or {}, now)
-
-        await self._database.write(work)
+        await note(connection, self._study_id, who, action, details or {}, utc_now())
 
     async def audit_log(self) -> tuple[AuditRow, ...]:
         columns = (audit.c.id, audit.c.at, audit.c.who, audit.c.action, audit.c.details)
@@ -147,7 +138,7 @@ async def change_database(path: Path, study_name: str, work: Callable[[Store], A
 async def _study_id(database: Database, name: str, file_hash: str, create: bool, alone: bool) -> int:
     now = utc_now()
 
-    async def work(connection: AsyncConnection) -> int:
+    async def work(connection: Connection) -> int:
         columns = (study.c.id, study.c.file_hash)
         row = (
             await connection.execute(select(*columns).where(study.c.name == name).with_for_update())

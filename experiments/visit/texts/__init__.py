@@ -92,11 +92,14 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
     return {name: _section(name, table, english[name], values, path) for name, table in tables.items()}
 
 
-def story_file(language: str) -> Path | None:
-    """Return the path of a language's story, or None for English. Raises ConfigError if it is missing."""
-    if language == "en":
+def story_file(language: str, *, several_homes: bool = False) -> Path | None:
+    """Return the path of a language's story, or None for English. Raises ConfigError if it is missing.
+
+    The story for `several_homes` does not name the bins, because they differ between homes.
+    """
+    if language == "en" and not several_homes:
         return None
-    path = FOLDER / f"story.{language}.md"
+    path = FOLDER / f"story{'_homes' if several_homes else ''}.{language}.md"
     if not path.is_file():
         raise ConfigError(
             f"there is no story in language {language!r}; name a file with `story` in [all_cells]"

@@ -238,6 +238,7 @@ class PlayedSession:
             floor_plan=trial.floor_plan,
             language=trial.language,
             texts=dict(trial.texts),
+            explains_markers=trial.explains_markers,
         )
         while crashes < MAX_CRASHES:
             self._set(State())

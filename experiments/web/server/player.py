@@ -15,6 +15,7 @@ class LiveTrial:
         before: Fields of the `phase_ended` events of earlier phases.
         leave_at: Monotonic time in seconds from which the participant may end the trial. It may be infinite.
         texts: HUD texts that override those of the language.
+        explains_markers: True if the instructions show a picture of the condition's markers.
     """
 
     phase: str
@@ -26,6 +27,7 @@ class LiveTrial:
     floor_plan: bool = False
     language: str = "en"
     texts: Mapping[str, str] = field(default_factory=dict)
+    explains_markers: bool = False
 
 
 class Player(Protocol):

@@ -49,7 +49,7 @@ class Drawer:
         send: Send,
         control: SessionControl,
     ) -> None:
-        self._scene, self._pictures = scene, pictures
+        self._scene, self.pictures = scene, pictures
         self._send, self._control = send, control
         self._changed = threading.Condition()
         self._view: View | None = None
@@ -117,7 +117,7 @@ class Drawer:
                 encoder, encoded_for = _encoder(job.view, size.index), (job.view, size.index)
                 job = job._replace(key=True)
             if job.view is not shown_to:
-                self._send(self._pictures())
+                self._send(self.pictures())
                 shown_to = job.view
             image = self._renderer(size.index).rgb(job.moment.data, markers=job.moment.markers)
             if job.moment.hidden:

@@ -13,10 +13,10 @@ from experiments.trials import warmup
 from experiments.trials.trial_config import TrialConfig
 from experiments.web.state import Pictures
 from experiments.web.worker.encoders import Image, data_url
+from experiments.web.worker.marker_picture import MarkerPicture, marker_picture
 from hud.state import FLOORPLAN
 from mjsim.formats.gltf.cache import cached_floor, cached_scene, view_path
 from mjsim.formats.gltf.store import scenes_folder
-from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.render import render_house_map, render_pictures
 
 DRAWING_TIMEOUT = 60.0  # timeout for drawing the pictures, in seconds
@@ -43,12 +43,18 @@ def encoded_pictures(name: str, floor_plan: bool) -> dict[str, str]:
     return {key: data_url(picture) for key, picture in found.items()}
 
 
-def shown_pictures(config: TrialConfig, catalogue: Catalogue) -> Pictures:
-    """Return the pictures of a trial's house, with labels in the language of `catalogue`. This requires OpenGL."""
+def shown_pictures(config: TrialConfig, shown: House, *, explained: bool = False) -> Pictures:
+    """Return the pictures of a trial's house, with labels in its language. This requires OpenGL.
+
+    If the markers are to be `explained`, one picture shows those of the trial's condition.
+    """
+    catalogue = shown.catalogue
     category = next(one for one in catalogue.categories.values() if one.objects)
     model, receptacle = catalogue.objects[category.objects[0]], catalogue.receptacles[category.receptacle]
     labels = {f"object:{model.key}": model.label, f"receptacle:{receptacle.key}": receptacle.label}
-    return Pictures(encoded_pictures(config.house, "minimap" in config.assistance), labels)
+    found = encoded_pictures(config.house, "minimap" in config.assistance)
+    markers = marker_picture(house(config.house), config) if explained else MarkerPicture()
+    return Pictures({**found, "markers": markers.picture} if markers.roles else found, labels, markers.roles)
 
 
 def scene_files(house: House) -> tuple[str, str]:

@@ -128,7 +128,9 @@ class Worker:
                     language=opened.language,
                     texts=_texts(opened),
                 )
-                pictures = partial(houses.shown_pictures, config, live.shown.catalogue)
+                pictures = partial(
+                    houses.shown_pictures, config, live.shown, explained=opened.explains_markers
+                )
                 with closing(Drawer(live.scene, pictures, self._send, control)) as drawer:
                     viewer.live, viewer.drawer = live, drawer
                     viewer.set_view(None)

@@ -12,7 +12,6 @@ from experiments.session.session import Viewer
 from experiments.web.controls import act
 from experiments.web.protocol import View
 from experiments.web.state import Busy, Hud, Markers, Moment, Reach, WireMessage
-from experiments.web.worker import houses
 from experiments.web.worker.clock import Send
 from experiments.web.worker.drawing import Drawer
 from experiments.web.worker.live_session import LiveSession
@@ -121,7 +120,8 @@ class BrowserViewer(Viewer):
         if view.codec == "none":
             self._snapshots = SnapshotStream(live, view)
             self._send(scene_of(live, view))
-            self._send(houses.shown_pictures(live.config, live.shown.catalogue))
+            if self.drawer is not None:
+                self._send(self.drawer.pictures())
 
     def _beside(
         self, live: LiveSession, seen: Observation, state: HudState, step: int

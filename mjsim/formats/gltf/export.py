@@ -277,10 +277,9 @@ class _Export:
 
 
 def _rooms(rooms: RoomMap) -> list[dict[str, Any]]:
-    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     return [
-        {"label": rooms.label(key), "polygon": [rounded(xy) for xy in centre + (corners * half) @ axes.T]}
-        for key, centre, half, axes in zip(rooms.keys, *rooms.rectangles, strict=True)
+        {"label": rooms.label(key), "polygon": [rounded(xy) for xy in corners]}
+        for key, corners in zip(rooms.keys, rooms.corners, strict=True)
     ]
 
 

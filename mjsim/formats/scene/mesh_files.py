@@ -65,9 +65,7 @@ def referenced(file: Path, name: str) -> Path:
 def read_surface(path: Path) -> Surface:
     """Read all triangles of a mesh file in its own unit and axes. Raise `AssetError` if there are none."""
     check_mesh_file(path)
-    with parsing(path):
-        scene = trimesh.load_scene(path, process=False, resolver=Nearby(path))
-    _check_triangles(path, scene)
+    scene = _load(path, path)
     with parsing(path):
         geometries = scene.dump()
     meshes = [g for g in geometries if isinstance(g, trimesh.Trimesh) and len(g.faces)]
@@ -173,10 +171,7 @@ def read_parts(path: Path, transform: Floats | None = None) -> list[MeshPart]:
         whole = whole @ Y_TO_Z
     elif suffix == ".dae":
         whole = whole @ _collada_frame(path)
-    with parsing(path):
-        source = _without_comments(path) if suffix == ".dae" else path
-        scene = trimesh.load_scene(source, file_type=suffix[1:], process=False, resolver=Nearby(path))
-    _check_triangles(path, scene)
+    scene = _load(path, _without_comments(path) if suffix == ".dae" else path)
     with parsing(path):
         known: dict[str, Surface] = {}
         parts = []
@@ -194,12 +189,16 @@ def read_parts(path: Path, transform: Floats | None = None) -> list[MeshPart]:
     return parts
 
 
-def _check_triangles(path: Path, scene: trimesh.Scene) -> None:
-    """Raise `AssetError` if a scene has too many triangles, including those of repeated meshes."""
+def _load(path: Path, source: Path | io.BytesIO) -> trimesh.Scene:
+    """Load a scene. Raise `AssetError` if it has too many triangles, including those of repeated meshes."""
+    with parsing(path):
+        kind = path.suffix.lower()[1:]
+        scene = trimesh.load_scene(source, file_type=kind, process=False, resolver=Nearby(path))
     keys = (scene.graph[node][1] for node in scene.graph.nodes_geometry)
     count = sum(len(getattr(scene.geometry[key], "faces", ())) for key in keys)
     if count > MAX_TRIANGLES:
         raise AssetError(f"{path} has {count} triangles; reduce it to {MAX_TRIANGLES} or fewer")
+    return scene
 
 
 def _nodes(scene: trimesh.Scene) -> Iterator[tuple[str, str, str]]:
@@ -231,7 +230,8 @@ def _collada_frame(path: Path) -> Floats:
     """Return the transform (4, 4) from a COLLADA file to metres with z up. trimesh ignores unit and axis."""
     unit, up = 1.0, "Y_UP"
     with parsing(path):
-        for tag, element in _elements(path):
+        for _, element in ET.iterparse(path):
+            tag = element.tag.rpartition("}")[2]
             if tag == "unit":
                 unit = float(element.get("meter", "1"))
             elif tag == "up_axis":
@@ -240,8 +240,3 @@ def _collada_frame(path: Path) -> Floats:
                 break
     turn = {"Z_UP": np.eye(4), "X_UP": rotation_matrix(-np.pi / 2, [0, 1, 0])}.get(up, Y_TO_Z)
     return np.asarray(scale_matrix(unit) @ turn)
-
-
-def _elements(path: Path) -> Iterator[tuple[str, ET.Element]]:
-    for _, element in ET.iterparse(path):
-        yield element.tag.rpartition("}")[2], element

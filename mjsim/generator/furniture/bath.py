@@ -146,8 +146,7 @@ def shower(b: Builder) -> Piece:
 
 
 def wash_corner(b: Builder) -> Piece:
-    row = [draw(Builder(name, b.rng, b.look, 1)) for name, draw in (("shower", shower), ("toilet", toilet))]
-    row.append(washbasin(Builder("washbasin", b.rng, b.look, 1)))
+    row = [b.draw(kind, 1) for kind in (shower, toilet, washbasin)]
     side = 1 if row[0].stands == "left" else -1
     members: list[Member] = []
     at = 0.0
@@ -204,8 +203,7 @@ def towel_rail(b: Builder) -> Piece:
 def bath_cabinet(b: Builder) -> Piece:
     w, d, h = b.pick(0.35, 0.4, 0.5), 0.35, b.pick(1.3, 1.7)
     paint = b.pick("white", b.wood, b.front)
-    b.shadow(w, (0, d))
-    b.box(paint, w, (0, d - 0.035), (0.06, h))
+    b.carcass(paint, w, d, (0.06, h))
     b.legs("dark", w, (0, d - 0.035), 0.06, 0.04, 0.02)
     b.fronts(paint, w, (0.08, 0.7), d - 0.035, 1, 1, doors=True)
     b.fronts(paint, w, (0.7, h - 0.01), d - 0.035, 1, 1, doors=True)

@@ -97,7 +97,7 @@ def bedside_table(b: Builder) -> Piece:
 
 
 def _tables(b: Builder, bed: Piece, sides: tuple[int, ...]) -> Piece:
-    table = bedside_table(Builder("bedside_table", b.rng, b.look))
+    table = b.draw(bedside_table)
     away = bed.size[0] / 2 + table.size[0] / 2 + 0.03
     return group(b.kind, [(bed, 0, 0, 0), *((table, side * away, 0, 0) for side in sides)], use=bed.use)
 

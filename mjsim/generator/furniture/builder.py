@@ -11,6 +11,7 @@ from mjsim.generator.furniture.piece import DrawnTexture, Obstacle, Piece, Point
 
 Span = tuple[float, float]
 T = TypeVar("T")
+FRONT = 0.035  # depth of cabinet doors and drawer fronts with their handles, in metres
 PANEL = 0.016  # thickness of cabinet doors and drawer fronts, in metres
 GAP = 0.008  # gap between cabinet doors or drawer fronts, in metres
 _LOW = ("books", "bowl", "box", "candles")
@@ -243,6 +244,15 @@ class Builder:
         euler = f' euler="{numbers(tilt, 0, 0)}"' if tilt else ""
         core = numbers(0.9 * half[0], 0.62 * half[1], 0.9 * half[2])
         self.add("box", material, True, f'pos="{numbers(*at)}" size="{core}"{euler}')
+
+    def draw(self, kind: "Callable[[Builder], Piece]", smaller: int = 0, fit: Point | None = None) -> Piece:
+        """Create a piece of another kind with the same random generator and materials."""
+        return kind(Builder(kind.__name__.strip("_"), self.rng, self.look, smaller, fit))
+
+    def carcass(self, material: str, w: float, d: float, z: Span) -> None:
+        """Add the body of a cabinet of depth `d` behind its fronts, and its contact shadow."""
+        self.shadow(w, (0, d))
+        self.box(material, w, (0, d - FRONT), z)
 
     def own(self, picture: DrawnTexture) -> str:
         """Register a texture for this piece, and return the name of its material."""

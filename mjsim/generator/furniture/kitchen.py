@@ -241,8 +241,7 @@ def kitchen_trolley(b: Builder) -> Piece:
 
 def larder(b: Builder) -> Piece:
     w, d, h = b.pick(0.6, 0.9, 1.0), 0.5, b.pick(1.9, TALL)
-    b.shadow(w, (0, d))
-    b.box("front_dark", w, (0, d - 0.035), (0, h))
+    b.carcass("front_dark", w, d, (0, h))
     b.fronts(b.front, w, (0.08, 1.2), d - 0.035, 1 if w < 0.7 else 2, 1, doors=True)
     b.fronts(b.front, w, (1.2, h - 0.01), d - 0.035, 1 if w < 0.7 else 2, 1, doors=True)
     return b.piece((w, d, h), use=0.65)

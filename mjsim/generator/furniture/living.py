@@ -11,7 +11,7 @@ VIEW = (1.2, 3.4)  # range of distances from a television to a sofa at the oppos
 
 
 def television(b: Builder) -> Piece:
-    stand = storage.tv_stand(Builder("tv_stand", b.rng, b.look, b.smaller))
+    stand = b.draw(storage.tv_stand, b.smaller)
     w, h = b.pick(1.1, 1.25, 1.4), stand.size[2]
     y, tall = 0.14, 0.57 * w
     b.box("black", 0.5, (0.06, 0.26), (h, h + 0.012), seen=True)
@@ -30,13 +30,10 @@ def lounge(b: Builder) -> Piece:
 
     If the distance allows it, the seats stand at the opposite wall, which is `fit[0]` away.
     """
-    name, draw = ("stove", stove) if b.chance(0.2) else ("television", television)
-    focus = draw(Builder(name, b.rng, b.look, b.smaller))
+    focus = b.draw(stove if b.chance(0.2) else television, b.smaller)
     corner = b.smaller == 0 and b.chance(0.4)
-    draw, name = (seats.corner_sofa, "corner_sofa") if corner else (seats.sofa, "sofa")
-    if b.smaller > 2:
-        draw, name = seats.armchair, "armchair"
-    sofa = draw(Builder(name, b.rng, b.look, b.smaller))
+    kind = seats.corner_sofa if corner else seats.sofa if b.smaller < 3 else seats.armchair
+    sofa = b.draw(kind, b.smaller)
     deep, gap = focus.size[1], (b.pick(2.1, 2.4, 2.7), b.pick(2.0, 2.2), 1.7, 1.4)[min(b.smaller, 3)]
     depth, aside, _ = b.fit or (0.0, 0.0, 0.0)
     across = depth - deep - sofa.size[1]
@@ -44,17 +41,17 @@ def lounge(b: Builder) -> Piece:
     back = deep + gap + sofa.size[1]
     members = [(focus, aside, 0.0, 0.0), (sofa, 0.0, back, math.pi)]
     front = back - sofa.size[1] if not corner else back - 0.92
-    table = tables.coffee_table(Builder("coffee_table", b.rng, b.look, b.smaller))
+    table = b.draw(tables.coffee_table, b.smaller)
     long = sofa.parts[-1].spot
     # The sofa is rotated by half a turn, which swaps left and right.
     x = math.copysign(0.46, long[0] + long[2]) if corner else 0.0
     y = front - 0.64 - table.size[1]
     if y - deep > 0.7:
         members.append((table, x, y, 0.0))
-    if name != "armchair" and b.chance(0.85):
+    if b.smaller < 3 and b.chance(0.85):
         wide, half = min(b.pick(2.0, 2.4), sofa.size[0]), min(gap / 2 - 0.1, b.pick(0.7, 0.85))
-        rug = Builder("rug", b.rng, b.look, fit=(wide, 2 * half, 0.0))
-        members.append((decoration.rug(rug), 0.0, (deep + front) / 2 + 0.25 - half, 0.0))
+        rug = b.draw(decoration.rug, fit=(wide, 2 * half, 0.0))
+        members.append((rug, 0.0, (deep + front) / 2 + 0.25 - half, 0.0))
     use = (aside - 0.4, deep, aside + 0.4, deep + 0.6)
     return group(b.kind, members, use=(use,))
 
@@ -71,7 +68,7 @@ def piano(b: Builder) -> Piece:
     b.box("piano_keys", w - 0.16, (0.4, d - 0.02), (0.68, 0.705), seen=True)
     b.image("linen", 0.34, (0.84, 1.05), 0.35, thick=0.006)
     b.clutter(0.8 * w, (0.08, 0.26), h, 2)
-    base, stool = b.piece((w, d, h + 0.3), use=0.7), seats.stool(Builder("stool", b.rng, b.look))
+    base, stool = b.piece((w, d, h + 0.3), use=0.7), b.draw(seats.stool)
     members = [(base, 0.0, 0.0, 0.0)]
     return group(b.kind, [*members, pushed_in(members, stool, 0.0, d - 0.1, math.pi)], use=())
 
@@ -99,8 +96,7 @@ def stove(b: Builder) -> Piece:
 
 def aquarium(b: Builder) -> Piece:
     w, d, h = b.pick(0.8, 1.0), 0.42, 0.72
-    b.shadow(w, (0, d))
-    b.box(b.wood, w, (0, d - 0.035), (0, h))
+    b.carcass(b.wood, w, d, (0, h))
     b.fronts(b.wood2, w, (0.05, h - 0.02), d - 0.035, 2, 1, doors=True)
     b.guard(w - 0.04, (0.02, d - 0.03), (h, h + 0.48))
     b.box("soil", w - 0.06, (0.03, d - 0.04), (h, h + 0.05), seen=True)

@@ -5,7 +5,7 @@ room, and the +z axis points up. Lengths are in metres.
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -103,7 +103,7 @@ class Piece:
         return [
             part.spot
             for part in self.parts
-            if not any(other.top < part.top and _overlap(other.spot, part.spot) for other in self.parts)
+            if not any(other.top < part.top and overlap(other.spot, part.spot) for other in self.parts)
         ]
 
     @cached_property
@@ -125,9 +125,9 @@ def moved(spot: Spot, x: float, y: float, yaw: float) -> Spot:
     """Rotate and translate a rectangle. Return the bounding rectangle of the result, in metres."""
     cos, sin = math.cos(yaw), math.sin(yaw)
     corners = [(u, v) for u in (spot[0], spot[2]) for v in (spot[1], spot[3])]
-    xs = [round(x + cos * u - sin * v, 4) for u, v in corners]
-    ys = [round(y + sin * u + cos * v, 4) for u, v in corners]
-    return min(xs), min(ys), max(xs), max(ys)
+    xs = [x + cos * u - sin * v for u, v in corners]
+    ys = [y + sin * u + cos * v for u, v in corners]
+    return round(min(xs), 4), round(min(ys), 4), round(max(xs), 4), round(max(ys), 4)
 
 
 def moved_point(point: Point, x: float, y: float, yaw: float) -> Point:
@@ -151,7 +151,8 @@ def intersect(boxes: Boxes, others: Boxes) -> bool:
     return bool((high - low > SLACK).all(axis=-1).any())
 
 
-def _overlap(a: Spot, b: Spot) -> bool:
+def overlap(a: Sequence[float], b: Sequence[float]) -> bool:
+    """Return True if two rectangles (x0, y0, x1, y1) overlap. Sharing an edge does not count."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 

@@ -8,8 +8,7 @@ def _wardrobe(b: Builder, mirrored: bool) -> Piece:
     w, d, h = b.size(1.0, 2.2, 0.2), 0.6, b.pick(2.0, 2.1, 2.2)
     doors = max(2, round(w / 0.5))
     carcass = b.pick(b.wood, "white", b.front)
-    b.shadow(w, (0, d))
-    b.box(carcass, w, (0, d - 0.035), (0, h))
+    b.carcass(carcass, w, d, (0, h))
     b.box("dark", w - 0.02, (d - 0.06, d - 0.03), (0, 0.06), seen=True)
     if not mirrored:
         b.handle = b.pick("bar", "bar", "knob")
@@ -36,8 +35,7 @@ def mirror_wardrobe(b: Builder) -> Piece:
 def chest_of_drawers(b: Builder) -> Piece:
     w, d, h = b.size(0.7, 1.3, 0.1), b.pick(0.42, 0.48), b.pick(0.75, 0.85, 1.0)
     carcass, low = b.pick(b.wood, "white", b.front), b.pick(0.0, 0.12)
-    b.shadow(w, (0, d))
-    b.box(carcass, w, (0, d - 0.035), (low, h))
+    b.carcass(carcass, w, d, (low, h))
     if low:
         b.legs(b.wood, w, (0, d - 0.03), low, 0.05, 0.02)
     fronts, columns = b.pick(carcass, b.wood2), 1 if w < 0.85 else 2
@@ -63,20 +61,25 @@ def _filled(b: Builder, w: float, z: float, high: float, d: float, x: float) -> 
         b.clutter(0.3, (0.1, d - 0.08), z, 1)
 
 
-def _shelf(b: Builder, w: float, h: float, d: float, columns: int, rows: int, back: bool = True) -> Piece:
-    frame = b.pick(b.wood, "white", b.wood2)
+def _frame(
+    b: Builder, paint: str, size: tuple[float, float, float], columns: int, boards: list[float]
+) -> None:
+    """Add the back, the sides and the boards of a shelf of width, depth and height `size`."""
+    w, d, h = size
     b.shadow(w, (0, d))
     b.guard(w, (0, d), (0, h))
-    if back:
-        b.box(frame, w, (0, 0.012), (0, h), seen=True)
+    b.box(paint, w, (0, 0.012), (0, h), seen=True)
     for i in range(columns + 1):
         x = -w / 2 + 0.012 + (w - 0.024) * i / columns
         top = h - 0.01 if 0 < i < columns else h
-        b.box(frame, 0.024, (0.012, d), (0, top), x, seen=True)
-    step = (h - 0.08) / rows
-    for j in range(rows + 1):
-        z = 0.06 if j == 0 else h - 0.02 if j == rows else 0.06 + step * j
-        b.box(frame, w - 0.048, (0.012, d - 0.004), (z, z + 0.02), seen=True)
+        b.box(paint, 0.024, (0.012, d), (0, top), x, seen=True)
+    for z in boards:
+        b.box(paint, w - 0.048, (0.012, d - 0.004), (z, z + 0.02), seen=True)
+
+
+def _shelf(b: Builder, w: float, h: float, d: float, columns: int, rows: int) -> Piece:
+    paint, step = b.pick(b.wood, "white", b.wood2), (h - 0.08) / rows
+    _frame(b, paint, (w, d, h), columns, [*(0.06 + step * j for j in range(rows)), h - 0.02])
     for i in range(columns):
         for j in range(rows):
             wide = w / columns - 0.05
@@ -118,8 +121,7 @@ def ladder_shelf(b: Builder) -> Piece:
 def sideboard(b: Builder) -> Piece:
     w, d, h = b.size(1.2, 1.8, 0.1), b.pick(0.42, 0.46), b.pick(0.7, 0.8)
     low, carcass = b.pick(0.04, 0.15), b.pick(b.wood, b.wood, "white", b.front)
-    b.shadow(w, (0, d))
-    b.box(carcass, w, (0, d - 0.035), (low, h))
+    b.carcass(carcass, w, d, (low, h))
     if low > 0.1:
         b.legs(b.pick(b.wood, b.metal), w, (0, d - 0.03), low, 0.08, 0.02)
     third, fronts = w / 3, b.pick(carcass, b.wood2)
@@ -133,8 +135,7 @@ def sideboard(b: Builder) -> Piece:
 def dresser(b: Builder) -> Piece:
     w, d, h = b.size(0.9, 1.2, 0.1), 0.45, b.pick(1.8, 1.9)
     paint = b.pick("cream", b.front, b.wood)
-    b.shadow(w, (0, d))
-    b.box(paint, w, (0, d - 0.035), (0, 0.86))
+    b.carcass(paint, w, d, (0, 0.86))
     b.fronts(paint, w, (0.06, 0.62), d - 0.035, 2, 1, doors=True)
     b.fronts(paint, w, (0.63, 0.84), d - 0.035, 2)
     b.box(b.wood, w, (0, d), (0.86, 0.89), seen=True)
@@ -176,8 +177,7 @@ def display_cabinet(b: Builder) -> Piece:
 def tv_stand(b: Builder) -> Piece:
     w, d, h = b.size(1.2, 1.8, 0.1), 0.4, b.pick(0.42, 0.5)
     low, carcass = b.pick(0.03, 0.14), b.pick(b.wood, b.wood, "white", b.front)
-    b.shadow(w, (0, d))
-    b.box(carcass, w, (0, d - 0.035), (low, h))
+    b.carcass(carcass, w, d, (low, h))
     if low > 0.1:
         b.legs(b.wood, w, (0, d - 0.03), low, 0.08, 0.02)
     third, fronts = w / 3, b.pick(carcass, b.wood2)
@@ -191,8 +191,7 @@ def tv_stand(b: Builder) -> Piece:
 def shoe_cupboard(b: Builder) -> Piece:
     w, d, h = b.size(0.6, 1.0, 0.1), b.pick(0.24, 0.28), b.pick(0.85, 1.05)
     paint = b.pick("white", b.wood, b.front)
-    b.shadow(w, (0, d))
-    b.box(paint, w, (0, d - 0.035), (0.02, h))
+    b.carcass(paint, w, d, (0.02, h))
     b.fronts(paint, w, (0.05, h - 0.02), d - 0.035, 1 if w < 0.75 else 2, b.pick(2, 3))
     b.clutter(0.8 * w, (0.05, d - 0.05), h, 2)
     return b.piece((w, d, h + 0.3), use=0.62)
@@ -201,8 +200,7 @@ def shoe_cupboard(b: Builder) -> Piece:
 def filing_cabinet(b: Builder) -> Piece:
     w, d, h = b.pick(0.42, 0.46), 0.5, b.pick(0.68, 1.02, 1.3)
     paint = b.pick("grey", "white", "front_dark", b.wood)
-    b.shadow(w, (0, d))
-    b.box(paint, w, (0, d - 0.035), (0, h))
+    b.carcass(paint, w, d, (0, h))
     b.handle = "bar"
     b.fronts(paint, w, (0.03, h - 0.02), d - 0.035, 1, round(h / 0.33))
     b.top(w, (0, d - 0.035), h)
@@ -227,18 +225,11 @@ def trunk(b: Builder) -> Piece:
 def toy_shelf(b: Builder) -> Piece:
     w, d, h = b.pick(0.9, 1.1), 0.36, b.pick(0.62, 0.9)
     rows = 2 if h < 0.8 else 3
-    frame = b.pick("white", b.wood)
-    b.shadow(w, (0, d))
-    b.guard(w, (0, d), (0, h))
-    b.box(frame, w, (0, 0.012), (0, h), seen=True)
-    for x in (-w / 2 + 0.012, w / 2 - 0.012):
-        b.box(frame, 0.024, (0.012, d), (0, h), x, seen=True)
-    for j in range(rows + 1):
-        z = (h - 0.02) * j / rows
-        b.box(frame, w - 0.048, (0.012, d - 0.004), (z, z + 0.02), seen=True)
+    boards = [(h - 0.02) * j / rows for j in range(rows + 1)]
+    _frame(b, b.pick("white", b.wood), (w, d, h), 1, boards)
     for i in range(3):
         for j in range(rows):
-            z, tub = (h - 0.02) * j / rows + 0.022, b.pick(*b.look.accents, "none")
+            z, tub = boards[j] + 0.022, b.pick(*b.look.accents, "none")
             if tub != "none":
                 b.box(tub, w / 3 - 0.06, (0.04, d - 0.02), (z, z + 0.2), (i - 1) * (w - 0.03) / 3, seen=True)
     for i, paint in enumerate(("accent_a", "accent_c", "accent_b")):

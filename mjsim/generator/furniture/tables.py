@@ -1,6 +1,7 @@
 """Tables and desks, some of which have seats."""
 
 import math
+from collections.abc import Callable
 
 from mjsim.generator.furniture import seats
 from mjsim.generator.furniture.builder import Builder
@@ -75,31 +76,30 @@ def pendant_lamp(b: Builder) -> Piece:
     return b.piece((0.8, 0.6, 2.6), parts=(), stands="ceiling")
 
 
+def _seat(b: Builder, draw: Callable[[Builder], Piece]) -> Piece:
+    """Create a seat that is used several times. It has its own random generator."""
+    rng = type(b.rng)(type(b.rng.bit_generator)(int(b.rng.integers(2**31))))
+    return draw(Builder(draw.__name__, rng, b.look))
+
+
 def dining(b: Builder) -> Piece:
     against = b.smaller >= 1
-    name = "table" if against or b.chance(0.7) else "round_table"
-    made = Builder(name, b.rng, b.look, b.smaller)
-    base = table(made) if name == "table" else round_table(made)
+    kind = table if against or b.chance(0.7) else round_table
+    base = b.draw(kind, b.smaller)
     w, d, _ = base.size
-    state = int(b.rng.integers(2**31))  # random state for all chairs, so that they look alike
-
-    def chair() -> Piece:
-        return seats.dining_chair(
-            Builder("dining_chair", type(b.rng)(type(b.rng.bit_generator)(state)), b.look)
-        )
-
+    chair = _seat(b, seats.dining_chair)
     edges = []  # middle of each seat's table edge, and the direction in which a person sits there
-    each = 2 if w >= 1.15 and b.smaller < 2 and name == "table" else 1
+    each = 2 if w >= 1.15 and b.smaller < 2 and kind is table else 1
     for i in range(each):
         x = (i + 0.5) * w / each - w / 2
         edges += [(x, d, math.pi)] if against else [(x, d, math.pi), (x, 0.0, 0.0)]
-    if name == "round_table" or (w >= 1.5 and b.chance(0.5)) or b.smaller:
+    if kind is round_table or (w >= 1.5 and b.chance(0.5)) or b.smaller:
         edges += [(side * w / 2, d / 2, side * math.pi / 2) for side in (-1, 1)]
     members = [(base, 0.0, 0.0, 0.0)]
     for edge in edges:
-        members.append(pushed_in(members, chair(), *edge))
+        members.append(pushed_in(members, chair, *edge))
     if b.chance(0.7):
-        members.append((pendant_lamp(Builder("pendant_lamp", b.rng, b.look)), 0.0, d / 2 - 0.3, 0.0))
+        members.append((b.draw(pendant_lamp), 0.0, d / 2 - 0.3, 0.0))
     return group(b.kind, members, use=(), stands="wall" if against else "free")
 
 
@@ -197,8 +197,8 @@ def _desk(b: Builder) -> Piece:
 
 
 def desk(b: Builder) -> Piece:
-    base = _desk(Builder("desk", b.rng, b.look, b.smaller))
-    chair = seats.office_chair(Builder("office_chair", b.rng, b.look))
+    base = b.draw(_desk, b.smaller)
+    chair = b.draw(seats.office_chair)
     w, d, _ = base.size
     x = 0.22 if w > 1.1 else 0.25
     turn = math.pi + float(b.rng.uniform(-0.35, 0.35))
@@ -236,8 +236,7 @@ def bar_table(b: Builder) -> Piece:
     b.box(b.metal, w - 0.12, (0.06, 0.09), (0.2, 0.23), seen=True)
     b.top(w, (0, d), h)
     members = [(b.piece((w, d, h + 0.25)), 0.0, 0.0, 0.0)]
-    state = int(b.rng.integers(2**31))
+    stool = _seat(b, seats.bar_stool)
     for side in (-1, 1):
-        stool = seats.bar_stool(Builder("bar_stool", type(b.rng)(type(b.rng.bit_generator)(state)), b.look))
         members.append(pushed_in(members, stool, side * w / 4, d, math.pi))
     return group(b.kind, members, use=())

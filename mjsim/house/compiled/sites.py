@@ -79,6 +79,12 @@ class RoomMap:
         """The centres (k, 2), half sizes (k, 2) and axes (k, 2, 2) of all rectangles, in metres."""
         return self.centers, self.half_sizes, self.axes
 
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """The corners of all rectangles in metres, counter-clockwise, shape (k, 4, 2)."""
+        signs = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        return np.array([c + (signs * half) @ axes.T for c, half, axes in zip(*self.rectangles, strict=True)])
+
     def label(self, key: str) -> str:
         """Return the label of a room. Raise an AssetError if the room does not exist."""
         if key not in self.labels:

@@ -53,36 +53,20 @@ def check_fit(episode: Episode, catalogue: Catalogue) -> Iterator[Finding]:
 def _check_object(placed: PlacedObject, target: str, catalogue: Catalogue) -> Iterator[Finding]:
     name = placed.name
     if not NAME.fullmatch(name) or name in catalogue.receptacles or f"{name}/" == PREFIX:
-        yield Finding(
-            "names",
-            f"object {name!r}",
-            "has a name that cannot be used in a scene",
-            "use letters, digits and _, such as object_07, and not the key of a receptacle",
-        )
+        remedy = "use letters, digits and _, such as object_07, and not the key of a receptacle"
+        yield Finding("names", f"object {name!r}", "has a name that cannot be used in a scene", remedy)
     model = catalogue.objects.get(placed.model)
     if model is None:
-        yield Finding(
-            "objects",
-            name,
-            f"is a {placed.model!r}, which catalogue {catalogue.name!r} does not have",
-            f"it has {sorted(catalogue.objects)}",
-        )
+        message = f"is a {placed.model!r}, which catalogue {catalogue.name!r} does not have"
+        yield Finding("objects", name, message, f"it has {sorted(catalogue.objects)}")
         return
+    receptacle = catalogue.categories[model.category].receptacle
     if placed.category != model.category:
-        yield Finding(
-            "objects",
-            name,
-            f"is of category {placed.category!r}, but a {placed.model!r} is of {model.category!r}",
-            "correct the category or the model",
-        )
-    elif target != catalogue.categories[model.category].receptacle:
-        yield Finding(
-            "receptacles",
-            name,
-            f"is to go into {target!r}, but {model.category!r} go into "
-            f"{catalogue.categories[model.category].receptacle!r}",
-            "correct its target",
-        )
+        message = f"is of category {placed.category!r}, but a {placed.model!r} is of {model.category!r}"
+        yield Finding("objects", name, message, "correct the category or the model")
+    elif target != receptacle:
+        message = f"is to go into {target!r}, but {model.category!r} go into {receptacle!r}"
+        yield Finding("receptacles", name, message, "correct its target")
 
 
 def check_poses(episode: Episode, rooms: RoomMap) -> Iterator[Finding]:
@@ -97,31 +81,20 @@ def check_poses(episode: Episode, rooms: RoomMap) -> Iterator[Finding]:
             place=(start.x, start.y, 0.0),
         )
     for placed in episode.objects:
-        norm = float(np.linalg.norm(placed.quaternion))
-        if abs(norm - 1.0) > UNIT:
-            yield Finding(
-                "poses",
-                placed.name,
-                f"has the quaternion {list(placed.quaternion)} of norm {norm:.3g}",
-                "give one of norm 1, such as (1, 0, 0, 0)",
-                place=placed.position,
-            )
-        if not HEIGHTS[0] <= placed.position[2] <= HEIGHTS[1]:
-            yield Finding(
-                "poses",
-                placed.name,
-                f"is at z = {placed.position[2]:.2f} m",
-                "put it onto the floor: z = 0",
-                place=placed.position,
-            )
-        elif not rooms.contains(placed.position[:2], margin=OUTSIDE):
-            yield Finding(
-                "poses",
-                placed.name,
-                f"at ({placed.position[0]:.2f}, {placed.position[1]:.2f}) lies outside of every room",
-                "move it into one",
-                place=placed.position,
-            )
+        for message, remedy in _pose_faults(placed, rooms):
+            yield Finding("poses", placed.name, message, remedy, place=placed.position)
+
+
+def _pose_faults(placed: PlacedObject, rooms: RoomMap) -> Iterator[tuple[str, str]]:
+    """Yield the message and the remedy of each fault in the pose of an object."""
+    norm, (x, y, z) = float(np.linalg.norm(placed.quaternion)), placed.position
+    if abs(norm - 1.0) > UNIT:
+        message = f"has the quaternion {list(placed.quaternion)} of norm {norm:.3g}"
+        yield message, "give one of norm 1, such as (1, 0, 0, 0)"
+    if not HEIGHTS[0] <= z <= HEIGHTS[1]:
+        yield f"is at z = {z:.2f} m", "put it onto the floor: z = 0"
+    elif not rooms.contains((x, y), margin=OUTSIDE):
+        yield f"at ({x:.2f}, {y:.2f}) lies outside of every room", "move it into one"
 
 
 def check_overlaps(episode: Episode, model: mujoco.MjModel, owner: NDArray[np.int32]) -> Iterator[Finding]:

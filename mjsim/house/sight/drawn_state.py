@@ -1,6 +1,6 @@
 """Compute the poses of the visual geoms of a scene, and find large boxes that block the view."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -12,7 +12,16 @@ from mjsim.support.kernels import kernel
 
 Floats = NDArray[np.float64]
 
+MARGIN = 1e-6  # tolerance for rounding errors, in metres
 _MIN_WALL = 0.25  # minimum half extents of a large box along its two longest axes, in metres
+
+
+class WallBoxes(NamedTuple):
+    """Large static boxes of a scene, from large to small."""
+
+    centers: Floats  # centres of the boxes in metres, shape (w, 3)
+    axes: Floats  # axes of the boxes as columns, shape (w, 3, 3)
+    half_sizes: Floats  # half extents of the boxes in metres, shape (w, 3)
 
 
 def drawn_state(scene: Scene, data: mujoco.MjData) -> tuple[Scene, mujoco.MjData]:
@@ -24,11 +33,8 @@ def drawn_state(scene: Scene, data: mujoco.MjData) -> tuple[Scene, mujoco.MjData
     return drawn.scene, drawn.data
 
 
-def large_boxes(scene: Scene, alpha: float) -> tuple[Floats, Floats, Floats]:
-    """Find large static boxes with an opacity above `alpha` in a scene with visual geoms, largest first.
-
-    Returns their centres (w, 3), axes as columns (w, 3, 3) and half extents (w, 3), in metres.
-    """
+def large_boxes(scene: Scene, alpha: float) -> WallBoxes:
+    """Find the large boxes with an opacity above `alpha` in a scene with visual geoms."""
     model = scene.model
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -40,7 +46,35 @@ def large_boxes(scene: Scene, alpha: float) -> tuple[Floats, Floats, Floats]:
     large = (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (extents[:, 1] >= _MIN_WALL)
     found = np.flatnonzero(large & static & drawn & (opacity > alpha))
     found = found[np.argsort(-extents[found, 1] * extents[found, 2], kind="stable")]
-    return data.geom_xpos[found], data.geom_xmat[found].reshape(-1, 3, 3), model.geom_size[found]
+    rotations = data.geom_xmat[found].reshape(-1, 3, 3)
+    return WallBoxes(data.geom_xpos[found], rotations, model.geom_size[found])
+
+
+@kernel
+def is_blocked(eye: Floats, ray: Floats, reach: float, walls: WallBoxes, inside: bool) -> bool:
+    """Return True if a wall blocks a ray from the eye within the fraction `reach` of its length.
+
+    A wall around the eye blocks the ray only if `inside` is True. Walls are made smaller by `MARGIN`, so that
+    rounding errors never block a ray.
+    """
+    for w in range(len(walls.centers)):
+        enter, leave = -np.inf, reach
+        for k in range(3):
+            along = start = 0.0
+            for j in range(3):
+                along += ray[j] * walls.axes[w, j, k]
+                start += (eye[j] - walls.centers[w, j]) * walls.axes[w, j, k]
+            half = walls.half_sizes[w, k] - MARGIN
+            if abs(along) > MARGIN:
+                near, far = (-half - start) / along, (half - start) / along
+                enter, leave = max(enter, min(near, far)), min(leave, max(near, far))
+            elif abs(start) > half:
+                leave = -np.inf
+            if enter >= leave:
+                break
+        if max(enter, 0.0) < leave and (inside or enter > 0.0):
+            return True
+    return False
 
 
 class _DrawnState:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mjsim.house.compiled.rays import Floats, Mask
 from mjsim.house.scene.scene import Scene
-from mjsim.house.sight.drawn_state import large_boxes
+from mjsim.house.sight.drawn_state import WallBoxes, is_blocked, large_boxes
 from mjsim.support.kernels import kernel
 from mjsim.values.observation import Observation
 
@@ -22,15 +22,6 @@ CELL = 0.25  # side length of a grid cell, in metres
 _MOVED = 1e-3  # displacement above which an object counts as moved, in metres
 _UNKNOWN, _HIDDEN, _OPEN = -1, 0, 1
 _OPAQUE = 0.99  # opacity above which a wall hides objects
-_MARGIN = 1e-6  # tolerance for rounding errors, in metres
-
-
-class _WallSegments(NamedTuple):
-    """The opaque static boxes of a scene, sorted from large to small."""
-
-    centers: Floats  # centres of the boxes in metres, shape (w, 3)
-    axes: Floats  # axes of the boxes as columns, shape (w, 3, 3)
-    half_sizes: Floats  # half extents of the boxes in metres, shape (w, 3)
 
 
 class _VisibilityGrid(NamedTuple):
@@ -101,12 +92,12 @@ def _balls(scene: Scene) -> tuple[Floats, Floats]:
     return offsets, radii
 
 
-def _opaque_walls(scene: Scene) -> _WallSegments:
+def _opaque_walls(scene: Scene) -> WallBoxes:
     scene = scene if scene.visuals else scene.counterpart(visuals=True)
-    return _WallSegments(*large_boxes(scene, _OPAQUE))
+    return large_boxes(scene, _OPAQUE)
 
 
-def _extent(walls: _WallSegments, margin: float) -> tuple[Floats, Floats]:
+def _extent(walls: WallBoxes, margin: float) -> tuple[Floats, Floats]:
     if not len(walls.centers):
         return np.full(2, -margin), np.full(2, margin)
     half = np.abs(walls.axes[:, :2]) @ walls.half_sizes[:, :, None]
@@ -135,7 +126,7 @@ def _may_see(
     stride: float,
     centers: Floats,
     radii: Floats,
-    walls: _WallSegments,
+    walls: WallBoxes,
     grid: _VisibilityGrid,
 ) -> Mask:
     """Return a mask of the objects within `angle` of the gaze that are visible from a cell near the eye.
@@ -163,7 +154,7 @@ def _may_see(
             cell[0], cell[1] = grid.origin[0] + (r + 0.5) * CELL, grid.origin[1] + (c + 0.5) * CELL
             if math.hypot(cell[0] - eye[0], cell[1] - eye[1]) > stride + CELL:
                 continue
-            if (r != row or c != column) and _is_blocked(start, cell, 1.0, walls):
+            if (r != row or c != column) and is_blocked(start, cell - start, 1.0, walls, True):
                 continue
             for i in range(len(radii)):
                 if ahead[i] and not found[i]:
@@ -174,40 +165,18 @@ def _may_see(
 
 
 @kernel
-def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: _WallSegments) -> int:
+def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: WallBoxes) -> int:
     ray = center - eye
     level = math.hypot(ray[0], ray[1])
     distance = math.hypot(level, ray[2])
     if distance <= radius or level < radius:
         return _OPEN
     reach = 1.0 - radius / distance  # fraction of the ray that is outside the bounding sphere
-    if not _is_blocked(eye, center, reach, walls):
+    if not is_blocked(eye, ray, reach, walls, True):
         return _OPEN
     side = np.array([-ray[1], ray[0], 0.0]) * (radius / level)
     top = np.array([-ray[0] * ray[2] / level, -ray[1] * ray[2] / level, level]) * (radius / distance)
     for end in (center + side, center - side, center + top, center - top):
-        if not _is_blocked(eye, end, reach, walls):
+        if not is_blocked(eye, end - eye, reach, walls, True):
             return _OPEN
     return _HIDDEN
-
-
-@kernel
-def _is_blocked(start: Floats, end: Floats, reach: float, walls: _WallSegments) -> bool:
-    for w in range(len(walls.centers)):
-        enter, leave = 0.0, reach
-        for k in range(3):
-            along = offset = 0.0
-            for j in range(3):
-                along += (end[j] - start[j]) * walls.axes[w, j, k]
-                offset += (start[j] - walls.centers[w, j]) * walls.axes[w, j, k]
-            half = walls.half_sizes[w, k] - _MARGIN
-            if abs(along) > _MARGIN:
-                near, far = (-half - offset) / along, (half - offset) / along
-                enter, leave = max(enter, min(near, far)), min(leave, max(near, far))
-            elif abs(offset) > half:
-                leave = -1.0
-            if enter >= leave:
-                break
-        if enter < leave:
-            return True
-    return False

@@ -16,14 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 from mjsim.house.compiled.rays import DRAWN, RIM, Floats, Mask, first_hit, moving_geoms
 from mjsim.house.compiled.sites import ReceptacleGeometry
 from mjsim.house.scene.scene import Scene
-from mjsim.house.sight.drawn_state import drawn_state, large_boxes
+from mjsim.house.sight.drawn_state import MARGIN, WallBoxes, drawn_state, is_blocked, large_boxes
 from mjsim.support.kernels import kernel
 from mjsim.values.person_parameters import PersonParameters
 
 # Rays aim at this fraction of the half extents, because the corners of bounding boxes are often empty.
 INSET = 0.7
 OFFSETS = np.vstack([np.zeros(3), INSET * np.eye(3), -INSET * np.eye(3)])
-_MARGIN = 1e-6  # tolerance for rounding errors, in metres
 
 
 @dataclass(frozen=True)
@@ -139,9 +138,7 @@ class _SightGeometry(NamedTuple):
     geoms: NDArray[np.int64]  # ids of drawn geoms that belong to objects, shape (g,)
     owners: NDArray[np.int64]  # index of the object to which each drawn geom belongs, shape (g,)
     boxes: Floats  # centre and half extents of the bounding box of each drawn geom in its frame, shape (g, 6)
-    wall_centers: Floats  # centres of large static boxes, from large to small, in metres, shape (w, 3)
-    wall_axes: Floats  # axes of the large boxes as columns, shape (w, 3, 3)
-    wall_half_sizes: Floats  # half extents of the large boxes in metres, shape (w, 3)
+    walls: WallBoxes
     person: Mask  # mask of the geoms of the person's body, shape (ngeom,)
 
 
@@ -188,14 +185,11 @@ def _sight_geometry(scene: Scene) -> _SightGeometry:
     model, owner = scene.model, scene.index.geom_owner
     drawn, static = DRAWN[model.geom_group] > 0, ~moving_geoms(model)
     geoms = np.flatnonzero((owner >= 0) & drawn)
-    centers, axes, half_sizes = large_boxes(scene, 0.0)
     return _SightGeometry(
         geoms=geoms,
         owners=owner[geoms].astype(np.int64),
         boxes=model.geom_aabb[geoms],
-        wall_centers=centers,
-        wall_axes=axes,
-        wall_half_sizes=half_sizes,
+        walls=large_boxes(scene, 0.0),
         person=(owner == -1) & ~static,
     )
 
@@ -218,7 +212,7 @@ def _open_rays(
             for k in range(3):
                 middle, half = (low[i, k] + high[i, k]) / 2, (high[i, k] - low[i, k]) / 2
                 ray[k] = middle + half * offset[k] - gaze.eye[k]
-            if _in_field(ray, gaze) and not _is_blocked(ray, low[i], high[i], gaze.eye, sight):
+            if _in_field(ray, gaze) and not _is_blocked_before(ray, low[i], high[i], gaze.eye, sight):
                 owners[count] = i
                 count += 1
     return owners[:count], rays[:count]
@@ -252,32 +246,15 @@ def _in_field(ray: Floats, gaze: _Gaze) -> bool:
 
 
 @kernel
-def _is_blocked(ray: Floats, low: Floats, high: Floats, eye: Floats, sight: _SightGeometry) -> bool:
+def _is_blocked_before(ray: Floats, low: Floats, high: Floats, eye: Floats, sight: _SightGeometry) -> bool:
     """Return True if a wall blocks a ray from the eye to the box with corners `low` (3,) and `high` (3,).
 
-    Walls are made smaller and the box larger by `_MARGIN`, so that rounding errors never block a ray.
+    The box is made larger by `MARGIN`, so that rounding errors never block a ray.
     """
     reach = 0.0  # fraction of the ray that is in front of the box
     for k in range(3):
-        if ray[k] > _MARGIN:
-            reach = max(reach, (low[k] - _MARGIN - eye[k]) / ray[k])
-        elif ray[k] < -_MARGIN:
-            reach = max(reach, (high[k] + _MARGIN - eye[k]) / ray[k])
-    for w in range(len(sight.wall_centers)):
-        enter, leave = -np.inf, reach
-        for k in range(3):
-            along = start = 0.0
-            for j in range(3):
-                along += ray[j] * sight.wall_axes[w, j, k]
-                start += (eye[j] - sight.wall_centers[w, j]) * sight.wall_axes[w, j, k]
-            half = sight.wall_half_sizes[w, k] - _MARGIN
-            if abs(along) > _MARGIN:
-                near, far = (-half - start) / along, (half - start) / along
-                enter, leave = max(enter, min(near, far)), min(leave, max(near, far))
-            elif abs(start) > half:
-                leave = -np.inf
-            if enter >= leave:
-                break
-        if 0.0 < enter < leave:
-            return True
-    return False
+        if ray[k] > MARGIN:
+            reach = max(reach, (low[k] - MARGIN - eye[k]) / ray[k])
+        elif ray[k] < -MARGIN:
+            reach = max(reach, (high[k] + MARGIN - eye[k]) / ray[k])
+    return is_blocked(eye, ray, reach, sight.walls, False)

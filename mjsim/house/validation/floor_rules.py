@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, distance_transform_edt, label
 
 from mjsim.house.compiled.footprint import ClearanceField
+from mjsim.house.compiled.rays import first_hit
 from mjsim.house.compiled.sites import RoomMap
 from mjsim.house.validation.bin_rules import check_bins
 from mjsim.house.validation.checked_model import Compiled
@@ -180,10 +181,8 @@ def _low_things(floor: WalkableFloor) -> NDArray[np.float64]:
 
 
 def _free(compiled: Compiled, point: NDArray[np.float64], up: float) -> float:
-    geom = np.zeros(1, np.int32)
-    start, along = np.array([*point, _CHEST]), np.array([0.0, 0.0, up])
-    distance = mujoco.mj_ray(compiled.model, compiled.data, start, along, _HANGING, 1, -1, geom)
-    return distance if distance >= 0 else math.inf
+    start, along = (*point, _CHEST), (0.0, 0.0, up)
+    return first_hit(compiled.model, compiled.data, start, along, groups=_HANGING)[0]
 
 
 RULES: tuple[Callable[[WalkableFloor], Iterator[Finding]], ...] = (

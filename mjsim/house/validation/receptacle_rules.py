@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.house.compiled.rays import first_hit
 from mjsim.house.validation.checked_model import Compiled, compile_model
 from mjsim.house.validation.findings import Finding, errors
 from mjsim.house.validation.object_rules import check_structure
@@ -78,7 +79,7 @@ def _open_top(compiled: Compiled) -> Iterator[Finding]:
     volume = _Volume(compiled)
     for x, y in _SLOTS:
         start = volume.at(x, y, volume.top + 0.5)
-        distance, geom = _ray(compiled, start, _DOWN)
+        distance, geom = first_hit(compiled.model, compiled.data, start, _DOWN)
         height = start[2] - distance
         if geom < 0 or height < volume.bottom - GAP:
             yield compiled.error(
@@ -108,7 +109,7 @@ def _walls(compiled: Compiled) -> Iterator[Finding]:
     for x, y in _SIDES:
         start, out = volume.at(0, 0, volume.bottom + 0.01), volume.axes @ np.array([x, y, 0.0])
         room = float(volume.half[0] if x else volume.half[1])
-        distance, geom = _ray(compiled, start, out)
+        distance, geom = first_hit(compiled.model, compiled.data, start, out)
         if geom < 0 or distance > room + GAP:
             yield compiled.error(
                 "container",
@@ -159,12 +160,6 @@ def _contacts(compiled: Compiled) -> Iterator[Finding]:
                 'give it condim="6" solref="0.008 1", or things roll on and sink in',
                 compiled.data.geom_xpos[geom],
             )
-
-
-def _ray(compiled: Compiled, start: NDArray[np.float64], along: NDArray[np.float64]) -> tuple[float, int]:
-    geom = np.array([-1], np.int32)
-    groups = np.array([1, 0, 0, 1, 0, 0], np.uint8)
-    return mujoco.mj_ray(compiled.model, compiled.data, start, along, groups, 1, -1, geom), int(geom[0])
 
 
 RULES: tuple[Callable[[Compiled], Iterator[Finding]], ...] = (_open_top, _walls, _base, _contacts)

@@ -60,9 +60,7 @@ def _point(place: object, axes: tuple[int, int]) -> Point:
 def _rectangles(rooms: RoomMap | None) -> tuple[tuple[str, NDArray[np.float64]], ...]:
     if rooms is None:
         return ()
-    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    corners = [centre + (signs * half) @ axes.T for centre, half, axes in zip(*rooms.rectangles, strict=True)]
-    return tuple((rooms.labels.get(k, k), c) for k, c in zip(rooms.keys, corners, strict=True))
+    return tuple((rooms.labels.get(k, k), c) for k, c in zip(rooms.keys, rooms.corners, strict=True))
 
 
 def _outlines(

@@ -141,11 +141,12 @@ def _choices(grid: FloorGrid, room: Mask, size: _Size, rng: np.random.Generator)
     for yaw, back in _TURNS:
         sides = np.ceil(np.array([size.width + 2 * _ASIDE, size.depth]) / CELL).astype(int).tolist()
         spans = [(0, side) for side in (sides[::-1] if back[0] else sides)]
-        edge = [_last(span, way) for span, way in zip(spans, back, strict=True)]
+        edge = [_beyond(span, way, -1) for span, way in zip(spans, back, strict=True)]
         before = [_beyond(span, -way, ahead) for span, way in zip(spans, back, strict=True)]
         behind = np.zeros_like(walls)
         for step in range(1, round(_WALL / CELL) + 1):
-            behind |= _shifted(walls, back, step)  # cells that have a wall at most `_WALL` behind them
+            shift = (-back[0] * step, -back[1] * step)
+            behind |= np.roll(walls, shift, (0, 1))  # cells that have a wall at most `_WALL` behind them
         fits = _all(free, spans) & _all(behind, edge) & _all(free, before) & (_count(standing, before) > 0)
         found += [
             _Choice(_at(spans, place), _at(before, place), yaw, back) for place in np.argwhere(fits).tolist()
@@ -154,16 +155,15 @@ def _choices(grid: FloorGrid, room: Mask, size: _Size, rng: np.random.Generator)
     return [found[k] for k in order]
 
 
-def _last(span: Span, way: int) -> Span:
-    """Return the last cell of a span in direction `way` (1 or -1), or the whole span if `way` is 0."""
-    start, stop = span
-    return {1: (stop - 1, stop), 0: span, -1: (start, start + 1)}[way]
-
-
 def _beyond(span: Span, way: int, cells: int) -> Span:
-    """Return `cells` cells after the span (`way` is 1) or before it (-1), or the span itself (0)."""
-    start, stop = span
-    return {1: (stop, stop + cells), 0: span, -1: (start - cells, start)}[way]
+    """Return `cells` cells after the span (`way` is 1) or before it (-1), or the span itself (0).
+
+    If `cells` is negative, return the cells at that end of the span.
+    """
+    if way == 0:
+        return span
+    end = span[way > 0]
+    return min(end, end + way * cells), max(end, end + way * cells)
 
 
 def _at(spans: Sequence[Span], place: Sequence[int]) -> tuple[slice, slice]:
@@ -218,7 +218,3 @@ def _all(mask: Mask, spans: Sequence[Span]) -> Mask:
     """Return a mask of the cells for which `mask` is true in the whole rectangle given by two spans."""
     (a, b), (c, d) = spans
     return np.asarray(_count(mask, spans) == (b - a) * (d - c))
-
-
-def _shifted(mask: Mask, by: tuple[int, int], steps: int) -> Mask:
-    return np.roll(mask, (-by[0] * steps, -by[1] * steps), (0, 1))

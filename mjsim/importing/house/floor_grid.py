@@ -7,7 +7,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, label
+from scipy.ndimage import distance_transform_edt, find_objects, label
 
 from mjsim.formats.scene.source_scene import MAX_SIDE, unit_of
 from mjsim.formats.scene.surface import Floats
@@ -169,11 +169,7 @@ def _rectangle(floor: Mask) -> Mask:
     """Return the cells in the bounding box of a floor, or of the whole scene if no floor is drawn."""
     edge = round(_PAD / CELL)
     inside = np.zeros_like(floor)
-    x, y = np.nonzero(floor)
-    if len(x):
-        inside[x.min() : x.max() + 1, y.min() : y.max() + 1] = True
-    else:
-        inside[edge:-edge, edge:-edge] = True
+    inside[find_objects(floor.astype(np.uint8))[0] if floor.any() else np.s_[edge:-edge, edge:-edge]] = True
     return inside
 
 

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from ortools.math_opt.python import mathopt
 
-from planner.exact.annealing import anneal_from, decode, tour_actions
+from planner.exact.annealing import anneal, inserted, tour_actions, tour_units
 from planner.exact.cuts.connectivity import Cut, violated
 from planner.exact.cuts.flow_model import FlowModel, FractionalSolver, integer_flow
 from planner.exact.cuts.graph import LONGEST, StateGraph, state_graph
 from planner.exact.cuts.root_bound import RootBound, root_bound
-from planner.exact.cuts.tours import joined, walks
+from planner.exact.cuts.tours import walks
 from planner.exact.instance import Instance
 from planner.exact.table import INFINITE, Solution
 from planner.solvers import Deadline
@@ -90,7 +90,7 @@ class _Search:
         """Run the search, and pause after each step that may have improved the tour or the bound."""
         n = len(self.instance.home)
         for k in range(min(RESTARTS, self.work // MOVES)):
-            if self.deadline.left < 2 * STEP_S:
+            if self.deadline.over():
                 break
             self.work -= MOVES
             self._anneal(seed + k, MOVES, np.arange(n), TEMPERATURES)
@@ -163,8 +163,8 @@ class _Search:
         if not result.has_primal_feasible_solution():
             return False
         flow = np.rint(model.values(result))
-        pieces = walks(graph, flow.astype(np.int64))
-        order = joined(self.instance, pieces)
+        way, *cycles = walks(graph, flow.astype(np.int64))
+        order = inserted(self.instance, way, cycles)
         self._offer(order)
         self._anneal(seed, REPAIR_MOVES, order, REPAIR_TEMPERATURES)
         return bool(self._new_cuts(graph, flow))
@@ -178,11 +178,10 @@ class _Search:
     def _anneal(
         self, seed: int, moves: int, order: NDArray[np.int64], temperatures: tuple[float, float]
     ) -> None:
-        _, better = anneal_from(self.instance, seed, moves, order, *temperatures)
+        _, better = anneal(self.instance, seed, moves, order, *temperatures, self.deadline)
         self._offer(better)
 
     def _offer(self, order: NDArray[np.int64]) -> None:
-        costs = np.empty((len(order) + 1, len(self.instance.bins) + 1), np.int64)
-        length = int(decode(self.instance, order, 0, costs))
+        length = tour_units(self.instance, order)
         if length < self.upper:
             self.upper, self.actions = length, tour_actions(self.instance, order).tolist()

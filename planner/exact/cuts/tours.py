@@ -3,9 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.exact.annealing import decode
 from planner.exact.cuts.graph import StateGraph
-from planner.exact.instance import Instance
 
 
 def walks(graph: StateGraph, flow: NDArray[np.int64]) -> list[list[int]]:
@@ -33,19 +31,3 @@ def _walk(graph: StateGraph, leaving: dict[int, list[int]], start: int) -> list[
             stack.pop()
             backwards.append(arc)
     return backwards[-2::-1]
-
-
-def joined(instance: Instance, pieces: list[list[int]]) -> NDArray[np.int64]:
-    """Return an order of picks, in which each cycle is turned and inserted where the tour becomes shortest."""
-    everything = set(range(len(instance.home)))
-    costs = np.empty((len(everything) + 1, len(instance.bins) + 1), np.int64)
-
-    def length(order: list[int]) -> int:
-        return int(decode(instance, np.array([*order, *sorted(everything - set(order))], np.int64), 0, costs))
-
-    order, *cycles = pieces
-    for cycle in cycles:
-        turned = [cycle[k:] + cycle[:k] for k in range(len(cycle))]
-        places = range(len(order) + 1)
-        order = min(([*order[:t], *turn, *order[t:]] for turn in turned for t in places), key=length)
-    return np.array(order, np.int64)

@@ -1,6 +1,7 @@
 """Files of studies with people: what they say, and errors that name the line."""
 
 import re
+from collections import Counter
 
 import pytest
 from starlette.datastructures import ImmutableMultiDict
@@ -74,8 +75,8 @@ def test_a_design_alone_is_no_study_with_people(tmp_path):
 
 def test_cells_share_what_is_one_for_all(tmp_path):
     path = tmp_path / "study.toml"
-    path.write_text(PAPER.read_text().replace("[[cells]]\n", '[[cells]]\nhouse = "studio"\n', 1))
-    with pytest.raises(ConfigError, match=r"house"):
+    path.write_text(PAPER.read_text().replace("[[cells]]\n", '[[cells]]\nhouse = "generated:0"\n', 1))
+    with pytest.raises(ConfigError, match=r"cells differ in houses \(apartment, generated:0"):
         read_people_study(path)
 
 
@@ -161,6 +162,21 @@ def test_every_language_has_the_same_texts_places_and_items():
         "trial.normal",
     }
     assert same == {"welcome.title", *international}, "these words are not translated"
+
+
+@pytest.mark.parametrize("language", languages())
+def test_people_in_several_homes_have_no_film_and_a_story_of_any_home(tmp_path, language):
+    path = tmp_path / "study.toml"
+    assert main(["study", "init", str(path)]) == 0
+    text = path.read_text().replace("[all_cells]", '[all_cells]\nhouses = "generated:0:3"')
+    path.write_text(text.replace('language = "en"', f'language = "{language}"'))
+    study = read_people_study(path)
+    assert study.settings.phases == tuple(name for name in PHASES if name != "flythrough")
+    assert "{" not in study.story and study.cells[0].trial(0).phase_names == ("story", "training", "task")
+    for cell in study.cells:
+        homes = Counter(trial.house for trial in cell.trials)
+        assert sorted(homes.values()) == [6, 7, 7]
+        assert [cell.trial(k).house for k in range(6)] == [*homes, *homes]
 
 
 def test_a_study_in_another_language_has_its_story_and_its_messages(tmp_path):

@@ -1,10 +1,12 @@
 """What a study file cannot mean is refused before anything starts, with line, key, value and choices."""
 
+import re
+
 import pytest
 
 from experiments.cli.main import main
 from experiments.errors import ConfigError
-from experiments.study.validation import check_study
+from experiments.study.validation import check_homes, check_study
 
 STUDY = """\
 [all_cells]
@@ -126,9 +128,39 @@ def test_a_good_file_is_a_study_and_platforms_are_asked_for_when_people_are_recr
         check_study(path, recruits=True)
 
 
-def test_homes_for_each_person_are_for_simulated_people_only(tmp_path):
-    said, line = refusal(tmp_path / "study.toml", "points = 40", 'houses = "generated:0:2"')
-    assert f"line {line}: " in said and "house has 2 values; a study with people is in one house" in said
+HOMES = ("points = 40", 'houses = "generated:0:2?rooms=1"')
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "part"),
+    [
+        ('"consent", "task"', '"consent", "flythrough", "task"', "phases has flythrough"),
+        ("minutes = 10", "minutes = 10\nrequire_film = true", "require_film is true"),
+        (
+            "house_seeds = 57",
+            'house_seeds = 57\nstory = "story.md"\nphases = "story,task"',
+            "story has {Bins}",
+        ),
+    ],
+)
+def test_a_study_in_several_homes_has_neither_a_film_nor_a_story_with_the_bins(tmp_path, before, after, part):
+    (tmp_path / "story.md").write_text("Bins: {Bins}.")
+    text = STUDY.replace(*HOMES).replace(before, after).replace('["consent"', '["consent", "story"')
+    (tmp_path / "study.toml").write_text(text)
+    with pytest.raises(ConfigError, match=f"{re.escape(part)}.* 2( houses)?[:;]") as caught:
+        check_study(tmp_path / "study.toml")
+    assert re.search(r"study.toml, line \d+: ", str(caught.value))
+
+
+@pytest.mark.slow
+def test_the_check_of_a_study_looks_for_the_places_of_the_objects_in_all_homes(tmp_path):
+    path, shown = tmp_path / "study.toml", []
+    path.write_text(STUDY.replace(*HOMES).replace("objects = 1", "objects = 3"))
+    check_homes(check_study(path), shown.append)
+    assert len({*shown}) == 2
+    path.write_text(path.read_text().replace("objects = 3", "objects = 40"))
+    with pytest.raises(ConfigError, match=r"study.toml: generated:0\?rooms=1&version=\d+, house seed 57: "):
+        check_homes(check_study(path), shown.append)
 
 
 @pytest.mark.parametrize(

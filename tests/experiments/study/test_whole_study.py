@@ -16,16 +16,17 @@ import pytest
 from experiments.cli.main import main
 from experiments.cli.server import http_server, listen, url_of
 from experiments.cli.study.database import sqlite_url
-from experiments.house import House
 from experiments.session.video import VideoWriter
 from experiments.study.file import read_people_study
 from experiments.study.plan import plan_of
 from experiments.study.rehearsal.person import Rehearsed, SimulatedPerson, Surroundings
 from experiments.study.rehearsal.plan import Planned
+from experiments.study.rehearsal.player import homes_in
 from experiments.visit.folders import VisitFolders
 from experiments.visit.procedure import Procedure
 from experiments.visit.server.app import ServerOptions, VisitServer
 from experiments.visit.store import Store
+from experiments.visit.tokens import token_hash
 from experiments.web.server.pool import WorkerPool
 
 PATIENCE = 120.0  # s
@@ -75,8 +76,11 @@ def start_once(command):
         assert server.wait(PATIENCE) in (0, 143)
 
 
-async def take_part(path, folder, film_file, people):
-    """Let simulated people take part in the served study like real ones, but without waiting."""
+async def take_part(path, folder, film_file, people, leaves=()):
+    """Let people take part in the served study like real ones, but without waiting. Those in `leaves` leave the task.
+
+    `people` are new people's numbers, or what came of those who return.
+    """
     study = read_people_study(path)
     store = await Store.open(sqlite_url(folder / "study.db"), study.settings.name, study.sha256, create=False)
     plan = dataclasses.replace(plan_of(study, film_file), rehearsal=True, minimum={})
@@ -89,12 +93,14 @@ async def take_part(path, folder, film_file, people):
         serving = asyncio.create_task(http.serve([listener]))
         client = await stack.enter_async_context(httpx.AsyncClient(base_url=base, timeout=PATIENCE))
         phases = {phase.name: phase for phase in procedure.phases}
-        around = Surroundings(base, client, phases, House.load(house), {}, {}, 3, 1e6)
-        gone = [Rehearsed(number) for number in range(people)]
+        around = Surroundings(base, client, phases, homes_in(procedure.folders), {}, {}, 3, 1e6)
+        gone = [Rehearsed(one) if isinstance(one, int) else one for one in people]
         for one in gone:
-            planned = Planned(one.number, one.number, 0.0, None, "", None, None, False, False, False)
+            how, where = ("vanishes", "task") if one.number in leaves else (None, "")
+            planned = Planned(one.number, one.number, 0.0, how, where, None, None, False, False, False)
             person = SimulatedPerson(planned, around, one)
-            await person.begin()
+            if not one.link:
+                await person.begin()
             await person.go()
         http.should_exit = True
         await serving
@@ -122,7 +128,7 @@ def test_the_file_of_init_goes_through_all_commands(tmp_path, study, capsys):
         "--no-open",
     ]
     start_once([sys.executable, "-m", "experiments.cli.main", *serve])
-    gone = asyncio.run(take_part(study, served, moving, 2))
+    gone = asyncio.run(take_part(study, served, moving, range(2)))
     assert [(one.outcome, one.faults) for one in gone] == [("finished", [])] * 2
     names = [str(study), str(served)]
     assert main(["study", "collect", *names, "--out", str(table)]) == 0
@@ -138,3 +144,72 @@ def test_the_file_of_init_goes_through_all_commands(tmp_path, study, capsys):
     assert "15.00 USD are owed in 2 of 2 payments" in capsys.readouterr().out
     paid = ["--paid", "p00001-reward", "--reference", "receipt", "--rehearsal", str(rehearsal)]
     assert main(["study", "pay", *names, *paid]) == 0
+
+
+HOMES = """
+[all_cells]
+user = "guest"
+fidelity = "event"
+regret = false
+objects = 1
+house_seeds = 57
+houses = "generated:0:4?rooms=2"
+
+[[cells]]
+assistance = "none"
+people = 4
+
+[[cells]]
+assistance = "optimal"
+seeds = "4:8"
+
+[study]
+name = "homes"
+title = "Tidying up"
+institution = "A university"
+contact = "people@university.edu"
+minutes = 10
+phases = ["consent", "story", "comprehension", "task", "survey", "completion"]
+
+[study.pay]
+reward = 2.0
+"""
+
+
+def home_of(served, one):
+    return (
+        VisitFolders(served / "visits")
+        .find(token_hash(one.link.rpartition("/")[2]))
+        .settings("task")["house"]
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_each_participant_has_a_home_of_the_range_until_the_data_are_analysed(tmp_path, monkeypatch, capsys):
+    study, served, rehearsal, table = (tmp_path / name for name in ("s.toml", "served", "rehearsal", "table"))
+    study.write_text(HOMES)
+    assert main(["study", "check", str(study)]) == 0, capsys.readouterr().out
+    rehearse = ["study", "rehearse", str(study), "--people", "4", "--dropouts", "0", "--per-minute", "30"]
+    assert main([*rehearse, "--out", str(rehearsal)]) == 0, capsys.readouterr().out
+    serve = ["study", "serve", str(study), "--out", str(served), "--port", "0", "--no-open"]
+    start_once([sys.executable, "-m", "experiments.cli.main", *serve])
+    with monkeypatch.context() as early:
+        early.setattr("experiments.study.rehearsal.person.moment", lambda *_: 1)  # before the task is over
+        first = asyncio.run(take_part(study, served, None, range(4), leaves=(2,)))
+    assert [one.outcome for one in first] == ["finished", "finished", "vanishes", "finished"]
+    homes = [home_of(served, one) for one in first]
+    later = asyncio.run(take_part(study, served, None, [first[2], *range(4, 8)]))
+    assert [(one.outcome, one.faults) for one in later] == [("finished", [])] * 5
+    assert [home_of(served, one) for one in first] == homes
+    names = [str(study), str(served)]
+    assert main(["study", "collect", *names, "--out", str(table)]) == 0
+    rows = pq.read_table(table / "trials.parquet").to_pylist()
+    wanted = [cell.trial(place).house for cell in read_people_study(study).cells for place in range(4)]
+    assert sorted(row["house"] for row in rows if row["assistance"] == "none") == sorted(wanted[:4])
+    assert sorted(row["house"] for row in rows) == sorted(wanted)
+    assert {row["participant"]: row["house"] for row in rows}["p00003"] == homes[2]
+    assert main(["study", "analyze", str(table)]) == 0, capsys.readouterr().err
+    assert main(["study", "export", *names, "--out", str(tmp_path / "export")]) == 0
+    assert main(["study", "pay", *names]) == 0
+    assert "16.00 USD are owed in 8 of 8 payments" in capsys.readouterr().out

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from houses_cases import BINS, PALETTE, flat, studio
 
-from mjsim.generator.furnish import FurnishedHome, Furnishing, furnish, furnish_home
+from mjsim.generator.furnish import FurnishedHome, furnish
 from mjsim.generator.furniture.piece import BIN_SIZES, flattened, intersect, moved, moved_boxes
 from mjsim.generator.space import Space
-from mjsim.generator.values import HomePlan, Placement, Rectangle
+from mjsim.generator.values import Furnishing, HomePlan, Placement, Rectangle
 from mjsim.values.errors import HouseError
 
 CASES = [(flat(), BINS, seed) for seed in range(2)] + [(studio(), BINS[:3], 0)]
@@ -18,7 +18,7 @@ CASES = [(flat(), BINS, seed) for seed in range(2)] + [(studio(), BINS[:3], 0)]
 @pytest.fixture(scope="module", params=CASES, ids=lambda case: f"{len(case[0].rooms)}-{case[2]}")
 def home(request: pytest.FixtureRequest) -> FurnishedHome:
     plan, bins, seed = request.param
-    return furnish_home(plan, bins, PALETTE, seed)
+    return furnish(plan, bins, PALETTE, seed)
 
 
 def boxes(space: Space) -> Iterator[list[Rectangle]]:
@@ -101,9 +101,9 @@ def test_a_place_behind_something_is_no_place() -> None:
     space = Space.of(studio(), studio().rooms[1], np.random.default_rng(0))
     x, y = space.room.floor.center
     space.hit.append((x - 0.3, y - 0.3, x + 0.3, y + 0.3))
-    assert space.can_take((x, y - 0.15, 0.7))
+    assert space.reachable([(x, y - 0.15, 0.7)])
     space.drawn = np.vstack([space.drawn, [x - 0.3, y - 0.35, 0.7, x + 0.3, y - 0.3, 0.95]])
-    assert not space.can_take((x, y - 0.15, 0.7))
+    assert not space.reachable([(x, y - 0.15, 0.7)])
 
 
 def test_all_places_of_use_can_be_reached(home: FurnishedHome) -> None:
@@ -152,13 +152,13 @@ def test_no_floor_is_shut_off_from_large_people_alone() -> None:
 
 @pytest.fixture(scope="module")
 def made() -> Furnishing:
-    return furnish(flat(), BINS, PALETTE, 3)
+    return furnish(flat(), BINS, PALETTE, 3).furnishing()
 
 
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_home_and_another_seed_another(made: Furnishing) -> None:
-    assert furnish(flat(), BINS, PALETTE, 3) == made
-    assert furnish(flat(), BINS, PALETTE, 4) != made
+    assert furnish(flat(), BINS, PALETTE, 3).furnishing() == made
+    assert furnish(flat(), BINS, PALETTE, 4).furnishing() != made
 
 
 def test_placements_name_each_asset_they_need(made: Furnishing) -> None:

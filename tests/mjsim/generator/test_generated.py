@@ -64,6 +64,15 @@ def test_a_house_is_recorded_with_its_rooms_and_the_version() -> None:
     assert catalogue.ref.kind == "generated"
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "rooms", "seats"), [(991001, 2, {"sofa"}), (991010, 1, {"armchair"})])
+def test_a_studio_has_seats_and_a_television_or_stove(seed: int, rooms: int, seats: set[str]) -> None:
+    _, furnishing = generate(seed, rooms)
+    kinds = {placement.name for placement in furnishing.placements if placement.room == "studio"}
+    assert kinds >= seats
+    assert kinds & {"tv_stand", "stove"}
+
+
 def test_a_recipe_gives_the_same_house(tmp_path: Path) -> None:
     recipe, _ = generate(11, 3)
     path = tmp_path / "house.json"

@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import math
+import threading
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from planning_cases import random_problem as points_or_metric
 
 from planner.checker import check
+from planner.exact import annealing
 from planner.exact.annealing import anneal, decode, tour_actions
 from planner.exact.expand import row_of
 from planner.exact.instance import make_instance, to_visits
@@ -22,7 +24,7 @@ from planner.exact.table_kernels import fill, walk
 from planner.plan import Status
 from planner.problem import RoutingProblem, Shipment, tour_length
 from planner.regret import one_by_one, regrets
-from planner.solvers import NEVER, SolveLimit, solver
+from planner.solvers import NEVER, Deadline, SolveLimit, solver
 
 seeds = st.integers(0, 2**32 - 1)
 random_problem = functools.partial(points_or_metric, bins=6)
@@ -144,13 +146,26 @@ def test_drops_of_a_pick_order_are_decoded_optimally(seed, n, onboard, bins):
 def test_annealing_costs_stay_consistent_with_decoding_from_scratch():
     problem = random_problem(3, 14, 1)
     instance = make_instance(problem, problem.integers.metric)
-    length, order = anneal(instance, 7, 3000)
+    length, order = anneal(instance, 7, 3000, np.arange(14), 0.5, 0.01)
     costs = np.empty((15, len(instance.bins) + 1), np.int64)
     assert sorted(order) == list(range(14))
     assert decode(instance, order, 0, costs) == length
-    again, same = anneal(instance, 7, 3000)
+    again, same = anneal(instance, 7, 3000, np.arange(14), 0.5, 0.01)
     assert again == length
     np.testing.assert_array_equal(order, same)
+
+
+def test_annealing_is_the_same_in_slices_and_stops_at_the_deadline(monkeypatch):
+    problem = random_problem(3, 14, 1)
+    instance, first = make_instance(problem, problem.integers.metric), np.arange(14)
+    length, order = anneal(instance, 7, 3000, first, 0.5, 0.01)
+    monkeypatch.setattr(annealing, "SLICE", 170)
+    again, same = anneal(instance, 7, 3000, first, 0.5, 0.01)
+    assert (again, same.tolist()) == (length, order.tolist())
+    stop = threading.Event()
+    stop.set()
+    longer, kept = anneal(instance, 7, 3000, first, 0.5, 0.01, Deadline(None, stop))
+    assert kept.tolist() == first.tolist() and longer > length
 
 
 @settings(max_examples=20, deadline=None)

@@ -8,8 +8,9 @@ from planning_cases import expected, grid_problem
 
 from planner.checker import check
 from planner.exact.solver import ExactSolver
-from planner.plan import Status
+from planner.plan import Proof, Status
 from planner.problem import RoutingProblem, Shipment, tour_length
+from planner.solvers import SolveLimit
 
 TABLE, SEARCH = ExactSolver(), ExactSolver(table_bytes=0)
 
@@ -28,6 +29,17 @@ def test_any_problem_is_solved_to_the_optimum(seed, capacity):
     length = expected(problem)
     for planner in (TABLE, SEARCH):
         check(problem, assert_optimal(problem, planner, length))
+
+
+@settings(max_examples=6, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), capacity=st.integers(3, 4))
+def test_with_more_hands_or_tools_finds_a_tour_next_to_a_true_bound(seed, capacity):
+    problem = grid_problem(np.random.default_rng(seed), 6, capacity)
+    limit, unit = SolveLimit(seconds=0.2), problem.integers.unit
+    for plan in (TABLE.solve(problem, limit=limit), *TABLE.improve(problem, limit=limit)):
+        check(problem, plan)
+        assert plan.certificate.proof in (Proof.EXHAUSTIVE, Proof.SPANNING_TREE)
+        assert plan.lower_bound <= expected(problem) * unit + 1e-6 <= plan.cost + 2e-6
 
 
 def test_the_oracle_knows_a_tour_that_was_worked_out_by_hand():

@@ -1,4 +1,7 @@
-"""${message}."""
+"""${message}.
+
+This migration also runs on a new database, so it skips tables and columns that exist already.
+"""
 
 import sqlalchemy as sa
 from alembic import op

@@ -9,6 +9,7 @@ import { textOf } from "./texts.js";
  * @property {string} title
  * @property {string[]} texts
  * @property {[string, string][]} [pictures] address and label
+ * @property {{ address: string, legend: string[] }} [markers] a picture of the markers, and a line for each kind
  * @property {[string[], string][]} [keys] names of keys, and their effect
  * @property {[string, string][]} [buttons] label and action
  */
@@ -28,21 +29,28 @@ const dialog = (title, content, label, action) => ({
 export const loading = (interrupted, late) =>
   late ? dialog("one_moment", "loading_late", "try_again", "reload") : dialog("one_moment", interrupted ? "restoring" : "loading");
 
+/** Roles of markers that the instructions explain. The rims of breadcrumbs belong to these. */
+const EXPLAINED = ["breadcrumb", "flagpole", "goal"];
+
 /**
  * @param {string} trial
  * @param {number} objects
  * @param {boolean} skippable
  * @param {[string, string][]} pictures addresses and labels of an object and its bin
  * @param {((action: string) => string) | null} key name of an action's key; null for touch screens
+ * @param {string[]} [roles] of the markers in a picture
+ * @param {string} [address] of the picture of the markers
  * @returns {Dialog}
  */
-export function instructions(trial, objects, skippable, pictures, key) {
+export function instructions(trial, objects, skippable, pictures, key, roles = [], address = "") {
+  const legend = EXPLAINED.filter((role) => roles.includes(role)).map((role) => textOf(`marker_${role}`));
   const task = objects === 1 ? textOf("task_one") : textOf("task_many", { count: objects });
   const shown = trial === "training" ? textOf("training_text") : `${task} ${textOf("clock_starts")}`;
   return {
     title: textOf(trial),
     texts: key ? [shown] : [shown, textOf("touch_text")],
     pictures,
+    ...(legend.length ? { markers: { address, legend } } : {}),
     keys: key ? keysOf(key) : [],
     buttons: trial === "training" ? [[textOf("start_training"), "run"], ...(skippable ? skip() : [])] : [[textOf("start"), "run"]],
   };

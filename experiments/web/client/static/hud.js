@@ -17,6 +17,9 @@ export class Hud {
   #pictures = new Map();
   /** @type {[string, string][]} */
   example = []; // addresses and labels of the pictures in the instructions
+  /** @type {string[]} */
+  roles = []; // roles of the markers in the picture of the instructions
+  markers = ""; // address of that picture
   /** @type {Moment[]} */
   #waiting = [];
   /** @type {HudState | null} */
@@ -33,7 +36,8 @@ export class Hud {
   }
 
   /** @param {Pictures} message */
-  learn({ pictures, example }) {
+  learn({ pictures, example, markers }) {
+    [this.roles, this.markers] = [markers, pictures["markers"] ?? ""];
     this.example = Object.entries(example).map(([key, label]) => [pictures[key] ?? "", label]);
     for (const [key, address] of Object.entries(pictures)) {
       const image = new Image();

@@ -33,12 +33,12 @@ export class Panel {
 
   /** @param {Dialog} dialog */
   show(dialog) {
-    const { title, texts, pictures = [], keys = [], buttons = [] } = dialog;
+    const { title, texts, pictures = [], markers, keys = [], buttons = [] } = dialog;
     const described = JSON.stringify(dialog);
     if (described === this.#shown && this.open) return; // a button keeps its focus
     this.#shown = described;
     within(this.#dialog, "h2", HTMLElement).textContent = title;
-    const content = [...texts.map((text) => made("p", text)), ...example(pictures), ...keyCaps(keys)];
+    const content = [...texts.map((text) => made("p", text)), ...example(pictures), ...explained(markers), ...keyCaps(keys)];
     within(this.#dialog, "#panel-text", HTMLElement).replaceChildren(...content);
     const elements = buttons.map(([label, action], i) => {
       const button = made("button", label);
@@ -71,6 +71,16 @@ function example(pictures) {
   });
   row.append(...figures.flatMap((figure, i) => (i ? [" → ", figure] : [" ", figure])));
   return [row];
+}
+
+/** Shows the markers with a line for each kind. @param {Dialog["markers"]} markers */
+function explained(markers) {
+  if (!markers) return [];
+  const [figure, legend] = [made("figure", ""), made("figcaption", "")];
+  figure.className = "explained";
+  legend.append(...markers.legend.map((line) => made("p", line)));
+  figure.append(Object.assign(new Image(), { src: markers.address, alt: textOf("markers_picture"), width: 640, height: 400 }), legend);
+  return [figure];
 }
 
 /** Draws key caps with their effect. @param {[string[], string][]} keys */

@@ -217,7 +217,7 @@ function report() {
 function instructions() {
   const touch = matchMedia("(pointer: coarse)").matches;
   const key = touch ? null : (/** @type {string} */ name) => bindings.key(name);
-  return dialogs.instructions(trial, Number(objects), performance.now() >= endable, hud.example, key);
+  return dialogs.instructions(trial, Number(objects), performance.now() >= endable, hud.example, key, hud.roles, hud.markers);
 }
 
 function run() {

@@ -101,7 +101,7 @@ describe("the display", () => {
     });
     hud.show(state({ checklist: rows, bins: [{ label: "Bin", place: "Kitchen\nleft", picture: "bin" }] }));
     expect(part("list").querySelectorAll("img")).toHaveLength(0);
-    hud.learn({ type: "pictures", pictures: { mug: "data:,mug", bin: "data:,bin" }, example: { mug: "Mug", bin: "Bin" } });
+    hud.learn({ type: "pictures", pictures: { mug: "data:,mug", bin: "data:,bin" }, example: { mug: "Mug", bin: "Bin" }, markers: [] });
     expect(hud.example).toEqual([["data:,mug", "Mug"], ["data:,bin", "Bin"]]);
     expect([part("list").querySelectorAll("img").length, part("bins").textContent]).toEqual([9, "BinKitchen left"]);
     expect(part("list").scrollTop).toBe(50); // two rows above it, and the list itself is at -10

@@ -131,6 +131,25 @@ describe("a trial", () => {
     expect(caps().slice(-2)).toEqual(["Space", "none"]);
   });
 
+  test("shows a picture of the markers with a line for each kind, or neither", async () => {
+    await opened({ trial: "task" });
+    const message = { type: "pictures", pictures: { markers: "data:,markers" }, example: {} };
+    const explained = () => part("panel-text").querySelector(".explained");
+    socket().receive({ ...message, markers: ["breadcrumb", "rim", "flagpole"] });
+    socket().state("ready");
+    socket().onmessage({ data: frame({ number: 1 }) });
+    await settled();
+    expect([...(explained()?.querySelectorAll("p") ?? [])].map((line) => line.textContent)).toEqual([
+      "Red dots lead to the next step.", "Flagpoles mark the objects. You see them even through walls.",
+    ]);
+    const picture = explained()?.querySelector("img");
+    expect([picture?.src, picture?.alt]).toEqual(["data:,markers", "A room with the marks that you see in your task"]);
+    socket().receive({ ...message, markers: [] });
+    socket().state("ready");
+    await settled();
+    expect(explained()).toBeNull();
+  });
+
   test("explains the gestures of a touch screen in words", async () => {
     vi.stubGlobal("matchMedia", () => ({ matches: true }));
     await opened();

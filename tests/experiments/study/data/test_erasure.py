@@ -110,6 +110,22 @@ def test_who_is_erased_is_nowhere_any_more(served, tmp_path, capsys):
     assert main(["study", "restore", str(tmp_path / "backup.db"), str(tmp_path / "again" / "study.db")]) == 0
 
 
+def test_nothing_is_said_about_files_that_do_not_contain_the_person(served, tmp_path, capsys):
+    async def arrive():
+        store = await _open(served)
+        await store.arrive("prolific", "dora-key", {"PROLIFIC_PID": "dora-PID"}, "d" * 64, "consent")
+        await store.close()
+
+    asyncio.run(arrive())
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "table").iterdir()}
+    capsys.readouterr()
+    assert main(["study", "erase", *served, "p00004", "--who", "me"]) == 0
+    said = capsys.readouterr().out
+    assert "was rewritten" not in said and "not on this machine" not in said
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "table").iterdir()} == before
+    assert traces(tmp_path, "dora", "d" * 64) == []
+
+
 def test_a_copy_that_was_moved_is_named(served, tmp_path, capsys):
     moved = [tmp_path / "backup.db", tmp_path / "runs.csv", tmp_path / "served" / "restored.db"]
     assert main(["study", "restore", str(moved[0]), str(moved[2])]) == 0

@@ -69,7 +69,7 @@ async def _fill(study, folder, run):
             await store.finish_phase(person.id, "consent", "consent", {"agreed": False}, status="no_consent")
             continue
         await store.finish_phase(person.id, "consent", "device", {"agreed": True})
-        measured = {"frames_per_s": 60.0, "renderer": HOSTILE, "faults": []}
+        measured = {"frames_per_s": 60.0, "renderer": HOSTILE, "faults": [], "attempts": 2}
         await store.finish_phase(person.id, "device", "task", measured)
         if name == "c":
             await store.withdraw(person.id, delete=False)
@@ -97,6 +97,7 @@ def test_an_export_has_tables_runs_and_a_codebook(served, tmp_path):
     assert (row["participant"], row["likert_useful"], row["answer_games"]) == ("p00001", "4", "Every day")
     phases = rows_of(out / "data" / "study-mystudy_description-phases_data.csv")
     assert {row["participant"] for row in phases} == {"p00001", "p00003"}
+    assert {(row["phase"], row["attempts"]) for row in phases} >= {("device", "2"), ("consent", "0")}
     answers = rows_of(out / "data" / "study-mystudy_description-answers_data.csv")
     assert {"participant": "p00001", "phase": "survey", "item": "useful", "answer": "4"} in answers
     assert (out / "runs" / "p00001" / "task" / "events.jsonl").is_file()

@@ -169,11 +169,10 @@ class _Sloppy(FormPhase):
 
 
 @pytest.fixture
-def quick(monkeypatch, house):
-    """Nobody plays a trial or waits long in the queue, and the house is there."""
+def quick(monkeypatch):
+    """Nobody plays a trial or waits long in the queue."""
     monkeypatch.setattr(SimulatedPerson, "_play", _play_nothing)
     monkeypatch.setattr("experiments.study.rehearsal.person.QUEUE_PAUSE", 0.1)
-    monkeypatch.setattr(runs.House, "load", lambda _: house)
 
 
 def _walked(study, folder, monkeypatch, phases=None):
@@ -208,6 +207,22 @@ def test_a_dry_run_goes_every_way_that_there_is(study, tmp_path, monkeypatch):
         "comprehension-screened_out", "withdrawal", "withdrawn", "timed_out", "paused", "full",
     ]  # fmt: skip
     assert walked.words["consent"] > 100 and walked.words["survey"] > 200
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick")
+def test_a_dry_run_shows_the_markers_of_each_condition_if_they_are_explained(tmp_path, monkeypatch):
+    phases = 'phases = ["consent", "task", "debriefing", "completion"]'
+    changed = with_text(
+        tmp_path,
+        phases=("minutes = 10", f"minutes = 10\n{phases}\nexplain_markers = true"),
+        minimum=("story = 20", ""),
+    )
+    _, pictures = _walked(changed, tmp_path, monkeypatch)
+    conditions = [
+        f"task-{name}" for name in dict.fromkeys(cell.trials[0].assistance for cell in changed.cells)
+    ]
+    assert [name for name in pictures if name.startswith("task-")] == conditions
 
 
 async def _play_nothing(self, trial, leaves):  # noqa: ARG001 - everybody stays

@@ -1,6 +1,7 @@
 """Views from outside: the person is where the observation says, and the whole floor is in view."""
 
 import math
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -66,7 +67,7 @@ def test_the_person_is_seen_where_they_are(scene, house_footprint: Footprint):
     path = camera_path("top-down", house_footprint.bounds, size[0] / size[1])
     world = World(scene)
     observation = world.observation()
-    with ExternalViewer(scene, FilmConfig(*size, "draft"), path, video) as viewer:
+    with closing(ExternalViewer(scene, FilmConfig(*size, "draft"), path, video)) as viewer:
         viewer.show(world, observation, NoMarkers())
     frame = video.frames[0].astype(int)
     rows, columns = np.nonzero((frame[..., 0] > 2 * frame[..., 1]) & (frame[..., 2] > 1.5 * frame[..., 1]))

@@ -216,7 +216,7 @@ PROXY, SPOOF = "203.0.113.9", "198.51.100."
     ],
 )
 def test_limits_hold_for_the_address_that_a_trusted_proxy_saw(tmp_path, pool, peer, forwarded, begun):
-    app = play_app(tmp_path, pool, "--trusted-proxy", PROXY)
+    app = play_app(tmp_path, pool, "--trusted-proxy", f"10.0.0.0/8,{PROXY}")
     with TestClient(app, base_url=ORIGIN, follow_redirects=False, client=(peer, 1)) as client:
         headers = [{"Origin": ORIGIN, "X-Forwarded-For": forwarded.format(i)} for i in range(9)]
         answers = [client.post("/begin", headers=sent).status_code for sent in headers]

@@ -37,9 +37,15 @@ def study():
 
 @contextmanager
 def serving(folder, study):
+    url = new_database(folder / "study.db")
+    with serving_from(url, folder, study) as client:
+        yield client
+
+
+@contextmanager
+def serving_from(url, folder, study):
     film = folder / "film.mp4"
     film.write_bytes(b"a film")
-    url = new_database(folder / "study.db")
 
     async def make():
         store = await Store.open(url, "study", "0" * 64)
@@ -181,6 +187,19 @@ def test_missing_answers_and_repeated_clicks_use_up_no_attempt(client, study, le
         )
     post(client, link, **{**wrong, "hands": "Two"})
     assert phase(client, link) == "training"
+
+
+def test_other_answers_on_an_old_page_count_after_a_restart(tmp_path, study):
+    url = new_database(tmp_path / "study.db")
+    wrong = {**right_answers(study), "hands": "One", "phase": "comprehension", "attempt": "0"}
+    with serving_from(url, tmp_path, study) as client:
+        link = begin(client)
+        go_to(client, link, study, "comprehension")
+        post(client, link, **wrong)
+    with serving_from(url, tmp_path, study) as client:
+        for answer, left in (("One", 2), ("As many as I like", 1)):
+            post(client, link, **{**wrong, "hands": answer})
+            assert f"Attempts left: {left}." in client.get(link).text
 
 
 def test_the_agreement_is_kept_with_version_and_hash_of_the_text(client, study, tmp_path):

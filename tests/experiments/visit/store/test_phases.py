@@ -72,9 +72,9 @@ async def test_when_a_phase_was_shown_first_counts(store, arrive):
     first = await store.show_phase(person.id, "consent", person.created)
     assert await store.show_phase(person.id, "consent", person.created + timedelta(minutes=1)) == first
     end = person.created + timedelta(minutes=2)
-    assert await store.finish_phase(person.id, "consent", "story", reason="read", attempts=2, now=end)
+    assert await store.finish_phase(person.id, "consent", "story", reason="read", now=end)
     [phase] = await store.phases(person.id)
-    assert (phase.duration_s, phase.attempts, phase.reason, phase.ended) == (120.0, 2, "read", end)
+    assert (phase.duration_s, phase.reason, phase.ended) == (120.0, "read", end)
 
 
 async def test_a_clock_that_steps_back_makes_no_negative_duration(store, arrive):

@@ -11,7 +11,7 @@ from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
 from experiments.web.controls import Input
 from experiments.web.protocol import View
-from experiments.web.state import GaitParameters, Hud, Markers, Moment, SceneMessage, Snapshot
+from experiments.web.state import GaitParameters, Hud, Markers, Moment, Pictures, SceneMessage, Snapshot
 from experiments.web.worker.live_session import LiveSession, open_journal
 from experiments.web.worker.viewer import HUD_EVERY, BrowserViewer
 from mjsim.house.scene.avatar import EYE
@@ -29,7 +29,7 @@ def shown(tmp_path, house):
     sent = []
     viewer = BrowserViewer(sent.append)
     live = LiveSession(open_journal(tmp_path), house, CONFIG, viewer)
-    drawer = SimpleNamespace(hidden=True, drawn=[], scene=live.scene)
+    drawer = SimpleNamespace(hidden=True, drawn=[], scene=live.scene, pictures=lambda: Pictures({}, {}))
     drawer.draw = lambda *moment: drawer.drawn.append(moment[-1])
     drawer.set_view = lambda _: None
     viewer.live, viewer.drawer = live, drawer

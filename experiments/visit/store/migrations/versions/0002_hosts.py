@@ -1,6 +1,6 @@
 """Add the table `host` and the column `person.host`, which support several hosts.
 
-An interrupted upgrade may have added one of them already.
+A new database has both, and an interrupted upgrade may have added one of them already.
 """
 
 import sqlalchemy as sa

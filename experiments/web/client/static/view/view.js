@@ -157,7 +157,7 @@ canvas.addEventListener("keydown", (event) => {
 for (const button of cameras) button.addEventListener("click", () => setCamera(/** @type {typeof camera} */ (button.dataset.camera)));
 byId("moments", HTMLElement).append(...recorded.moments.map(listed));
 byId("ticks", HTMLElement).append(...recorded.moments.map(tick));
-hud.learn({ type: "pictures", pictures: recorded.pictures, example: {} });
+hud.learn({ type: "pictures", pictures: recorded.pictures, example: {}, markers: [] });
 new ResizeObserver(() => world.resize()).observe(canvas);
 await world.load((name) => files[name] ?? name);
 await world.setObjects(
