@@ -4,9 +4,11 @@ from contextlib import contextmanager
 
 import mujoco
 import numpy as np
+import pytest
 from small_worlds import scene_of, world_of
 
 from mjsim.values.actions import IDLE
+from mjsim.world.body.falls import FallDetector
 
 MODELS = ("jeans", "magazine", "t_shirt", "bottle", "plate", "towel", "newspaper", "comics")
 HEIGHT = 1.3  # of the carrying posture, m
@@ -51,3 +53,26 @@ def test_a_dropped_object_sinks_in_less_than_a_centimetre(catalogue, navmesh):
     assert 0.001 < max(depths) < DEEPEST
     assert world.model.opt.timestep == timestep
     assert np.array_equal(world.model.geom_solref, softness)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "loose", "carried"),
+    [
+        ((0.0, 0.0, -1.2), True, False),  # falls
+        ((0.0, 0.0, 1.2), False, False),
+        ((1.9, 0.0, 0.0), False, False),  # is kicked, or carried by a person who walks and turns
+        ((1.6, 0.0, 1.6), False, True),  # swings around the hand
+        ((0.0, 0.0, -2.1), True, True),
+    ],
+)
+def test_loads_may_be_faster_than_loose_objects(catalogue, navmesh, velocity, loose, carried):
+    rng = np.random.default_rng(8)
+    places = [(model, *navmesh.sample(rng)) for model in MODELS[:2]]
+    world = world_of(scene_of(catalogue, (*navmesh.sample(rng), 0.0), *places, height=0.01))
+    detector = FallDetector(world.model, world.data, world.scene.index)
+    world.data.qvel[:] = 0.0
+    assert not detector.detects(()) and not detector.detects((0, 1))
+    dof = world.scene.index.dofs[1]
+    world.data.qvel[dof : dof + 3] = velocity
+    assert (detector.detects(()), detector.detects((0,))) == (loose, loose)
+    assert (detector.detects((1,)), detector.detects((0, 1))) == (carried, carried)
