@@ -1,7 +1,7 @@
-"""A detector of falling objects, for which physics steps are shortened.
+"""A detector of fast objects, for which physics steps are shortened.
 
 In one physics step of 4 ms, an object that has fallen from a hand moves by 2 cm, so it would sink that far into the
-floor before MuJoCo detects a contact.
+floor before MuJoCo detects a contact. The same holds for a load that swings around a hand against furniture.
 """
 
 import math
@@ -15,6 +15,7 @@ from mjsim.house.scene.scene import SceneIndex
 from mjsim.support.kernels import kernel
 
 MAX_SPEED = 1.0  # downward speed of a part of an object above which the object is falling, in m/s
+MAX_SWING = 2.0  # speed of a carried object above which it swings around the hand, in m/s
 Floats = NDArray[np.float64]
 
 
@@ -29,7 +30,7 @@ class FallDetector:
         self._arrays = (data.qvel, data.xmat, index.dofs, index.bodies, radii)
 
     def detects(self, gripped: tuple[int, ...]) -> bool:
-        """Return True if an object that is not `gripped` falls or tumbles fast."""
+        """Return True if a `gripped` object swings, or another object falls or tumbles fast."""
         first, second = (*gripped, -1, -1)[:2]
         return bool(_falls(self._arrays, first, second))
 
@@ -39,12 +40,16 @@ def _falls(arrays: Any, first: int, second: int) -> bool:
     qvel, xmat, dofs, bodies, radii = arrays
     for item in range(len(dofs)):
         dof = dofs[item]
+        if item == first or item == second:
+            if qvel[dof] ** 2 + qvel[dof + 1] ** 2 + qvel[dof + 2] ** 2 > MAX_SWING**2:
+                return True
+            continue
         square = upright = 0.0
         for axis in range(3):  # of the body's frame, in which the third row of `xmat` points up
             rate = qvel[dof + 3 + axis]
             square += rate * rate
             upright += rate * xmat[bodies[item], 6 + axis]
         tumbling = math.sqrt(max(0.0, square - upright * upright))
-        if item != first and item != second and tumbling * radii[item] - qvel[dof + 2] > MAX_SPEED:
+        if tumbling * radii[item] - qvel[dof + 2] > MAX_SPEED:
             return True
     return False
