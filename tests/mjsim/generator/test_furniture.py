@@ -142,6 +142,12 @@ def test_things_in_a_shelf_do_not_reach_through_its_boards(kind: str, look: Appe
         assert not intersect(piece.drawn[frame], piece.drawn[~frame]), seed
 
 
+def test_the_texture_of_a_picture_follows_from_its_seed(look: Appearance) -> None:
+    one, same, other = (make("picture", look, seed).pictures[0] for seed in (1, 1, 2))
+    assert one.name == same.name != other.name
+    assert one.draw() == one.draw() == same.draw() != other.draw()
+
+
 def test_a_table_is_apart_from_the_long_part_of_a_corner_sofa(look: Appearance) -> None:
     lounge = make("lounge", look, 392)  # has the narrowest corner sofa, and without a limit the widest table
     boxes = {piece.kind: moved_boxes(piece.drawn, *pose) for piece, *pose in flattened(lounge)}
