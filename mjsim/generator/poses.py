@@ -28,7 +28,7 @@ def wall_poses(floor: Rectangle, piece: Piece, sides: Iterable[Side]) -> Floats:
             at_low = (piece.stands == "left") == (turns in (0, 1))
             along = np.array([first if at_low else last])
         else:
-            along = np.unique(np.round([*np.arange(first, last, STEP), last], 3))
+            along = np.round(np.append(np.arange(first, last - 0.001, STEP), last), 3)
         x, y = floor.along(side, first, first, WALL_GAP, WALL_GAP).center
         rows = np.tile((x, y, turns, 0.0), (len(along), 1))
         rows[:, 0 if side in ("south", "north") else 1] = rows[:, 3] = along
