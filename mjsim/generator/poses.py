@@ -1,12 +1,11 @@
 """List the poses in which furniture can stand in a room."""
 
-import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.generator.furniture.piece import Piece, Spot, moved
+from mjsim.generator.furniture.piece import Piece, Spot
 from mjsim.generator.values import BACK, Rectangle, Side
 
 STEP = 0.1  # distance between poses that are tried along a wall, in metres
@@ -29,7 +28,7 @@ def wall_poses(floor: Rectangle, piece: Piece, sides: Iterable[Side]) -> Floats:
             at_low = (piece.stands == "left") == (turns in (0, 1))
             along = np.array([first if at_low else last])
         else:
-            along = np.unique(np.round([*np.arange(first, last, STEP), last], 3))
+            along = np.round(np.append(np.arange(first, last - 0.001, STEP), last), 3)
         x, y = floor.along(side, first, first, WALL_GAP, WALL_GAP).center
         rows = np.tile((x, y, turns, 0.0), (len(along), 1))
         rows[:, 0 if side in ("south", "north") else 1] = rows[:, 3] = along
@@ -46,5 +45,6 @@ def free_poses(floor: Rectangle) -> Floats:
 
 def moved_spots(spots: Sequence[Spot], places: Floats) -> Floats:
     """Move rectangles to n poses. Return their bounding rectangles, shape (n, k, 4)."""
-    turned = np.array([[moved(spot, 0.0, 0.0, turns * math.pi / 2) for spot in spots] for turns in range(4)])
-    return np.asarray(turned.reshape(4, -1, 4)[places[:, 2].astype(int)] + places[:, None, [0, 1, 0, 1]])
+    x0, y0, x1, y1 = np.round(np.array(spots, float).reshape(-1, 4), 4).T
+    turned = np.array([[x0, y0, x1, y1], [-y1, x0, -y0, x1], [-x1, -y1, -x0, -y0], [y0, -x1, y1, -x0]])
+    return np.asarray(turned.swapaxes(1, 2)[places[:, 2].astype(int)] + places[:, None, [0, 1, 0, 1]])

@@ -132,16 +132,15 @@ class Space:
         places = free_poses(self.room.floor) if free else wall_poses(self.room.floor, piece, sides)
         if not len(places):
             return None
-        boxes, hits, uses, bins, stands = (
-            moved_spots(spots, places)
-            for spots in (
-                [part.spot for part in piece.parts],
-                [part.hit for part in piece.parts],
-                piece.use,
-                [mount.spot for mount in piece.mounts],
-                [mount.stand for mount in piece.mounts],
-            )
+        spots = (
+            [part.spot for part in piece.parts],
+            [part.hit for part in piece.parts],
+            piece.use,
+            [mount.spot for mount in piece.mounts],
+            [mount.stand for mount in piece.mounts],
         )
+        there, ends = moved_spots(list(itertools.chain(*spots)), places), np.cumsum([len(of) for of in spots])
+        boxes, hits, uses, bins, stands = np.split(there, ends[:-1], axis=1)
         tops = np.array([part.top for part in piece.parts])
         ok = self._fits(boxes, tops, uses, free) & ~_overlap(boxes, np.array(avoid).reshape(-1, 4))
         ok &= ~_overlap(bins, np.array(self.beside).reshape(-1, 4))
@@ -150,13 +149,13 @@ class Space:
         order: list[int] = fits[np.argsort(-self._scores(boxes[fits], free), kind="stable")].tolist()
         poses = ((k, self._pose(places[k], free)) for k in order)
         for k, place in itertools.islice(((k, at) for k, at in poses if self.is_clear(piece, at)), TRIES):
-            spots, hit, zones = ([_spot(box) for box in of[k].tolist()] for of in (boxes, hits, uses))
+            own, hit, zones = ([_spot(box) for box in of[k].tolist()] for of in (boxes, hits, uses))
             used = (
                 [] if piece.kind in UNUSED else [moved(s, place.x, place.y, place.yaw) for s in piece.reached]
             )
             if self.connected(hit, zones, used):
                 self.near += used
-                self.stand(piece, place, spots, zones, hit)
+                self.stand(piece, place, own, zones, hit)
                 return place
         return None
 

@@ -36,7 +36,7 @@ def landscapes(seed: int) -> list[Asset]:
         image += 0.6 * np.clip(clouds / clouds.std() - 0.9, 0, 1)[..., None] * (1 - image)
         _STYLES[style](own, image, x, y)
         pixels = np.clip(255 * image[..., ::-1], 0, 255).astype(np.uint8)
-        png = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes()
+        png = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 6])[1].tobytes()
         name = f"view_{side}"
         texture = f'<texture name="{name}_image" type="2d" file="{name}_image.png"/>'
         material = f'<material name="{name}" texture="{name}_image" emission="0.75"/>'

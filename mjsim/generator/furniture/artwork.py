@@ -1,6 +1,5 @@
 """Draw pictures and rug patterns in the colours of a home."""
 
-import hashlib
 import math
 from collections.abc import Callable
 
@@ -17,16 +16,37 @@ Style = Callable[[np.random.Generator, Image, Plane, Plane, Image], None]
 
 
 def painting(rng: np.random.Generator, look: Appearance, wide: int = 128, high: int = 96) -> DrawnTexture:
-    """Draw a random picture with a width of `wide` pixels and a height of `high` pixels."""
+    """Create a random picture with a width of `wide` pixels and a height of `high` pixels."""
+    return _texture("picture", rng, lambda own: _painted(own, look, wide, high))
+
+
+def carpet(rng: np.random.Generator, look: Appearance, round_one: bool = False) -> DrawnTexture:
+    """Create a random pattern for a rug. Round rugs have a pattern of rings."""
+    return _texture("rug", rng, lambda own: _woven_rug(own, look, round_one))
+
+
+def _texture(
+    name: str, rng: np.random.Generator, draw: Callable[[np.random.Generator], Image]
+) -> DrawnTexture:
+    """Create a texture that is drawn when it is needed, because most pieces do not fit and are discarded."""
+    seed = int(rng.integers(2**40))
+
+    def png() -> bytes:
+        pixels = np.clip(255 * draw(np.random.default_rng(seed))[..., ::-1], 0, 255).astype(np.uint8)
+        return cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 2])[1].tobytes()
+
+    return DrawnTexture(f"{name}_{seed:010x}", png)
+
+
+def _painted(rng: np.random.Generator, look: Appearance, wide: int, high: int) -> Image:
     y, x = np.mgrid[0:high, 0:wide] / np.array([high, wide]).reshape(2, 1, 1)
     colours = _palette(rng, look, 6)
     image = (0.75 + 0.25 * colours[0]) * (1 - 0.25 * y[..., None])
     _STYLES[int(rng.integers(len(_STYLES)))](rng, image, x, y, colours)
-    return _file("picture", image)
+    return image
 
 
-def carpet(rng: np.random.Generator, look: Appearance, round_one: bool = False) -> DrawnTexture:
-    """Draw a random pattern for a rug. Round rugs have a pattern of rings."""
+def _woven_rug(rng: np.random.Generator, look: Appearance, round_one: bool) -> Image:
     n = 128
     y, x = (np.mgrid[0:n, 0:n] + 0.5) / n
     ground, one, two, three = _palette(rng, look, 4)
@@ -54,7 +74,7 @@ def carpet(rng: np.random.Generator, look: Appearance, round_one: bool = False) 
     if style in ("lozenges", "medallion", "border"):
         image[edge < 0.09], image[edge < 0.07], image[edge < 0.025] = two, one, three
     worn = cv2.GaussianBlur(rng.standard_normal((n, n)), (0, 0), 1.2)
-    return _file("rug", image * (1 + 0.1 * worn[..., None]))
+    return np.asarray(image * (1 + 0.1 * worn[..., None]))
 
 
 _RUGS = ("stripes", "lozenges", "medallion", "zigzag", "checks", "border")
@@ -122,9 +142,3 @@ def _palette(rng: np.random.Generator, look: Appearance, count: int) -> Image:
     while len(chosen) < count:
         chosen = np.vstack([chosen, chosen[int(rng.integers(len(chosen)))] * rng.uniform(0.5, 0.9)])
     return np.asarray(np.clip(chosen * rng.uniform(0.85, 1.15, (len(chosen), 1)), 0, 1))
-
-
-def _file(name: str, image: Image) -> DrawnTexture:
-    pixels = np.clip(255 * image[..., ::-1], 0, 255).astype(np.uint8)
-    png = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 2])[1].tobytes()
-    return DrawnTexture(f"{name}_{hashlib.sha256(pixels.tobytes()).hexdigest()[:10]}", png)

@@ -166,11 +166,11 @@ class Builder:
     def clutter(
         self, w: float, y: Span, z: float, most: int = 3, x: float = 0.0, *, low: bool = False
     ) -> None:
-        """Add small objects on a surface of height `z`. If `low` is True, they are at most 0.13 m tall."""
+        """Add a row of small objects on a surface; see `thing`."""
         places = int(np.clip(w // 0.35, 1, most))
         for i in range(int(self.rng.integers(1, places + 1))):
             u = x + w * ((i + 0.5) / places - 0.5) + 0.05 * float(self.rng.uniform(-1, 1))
-            self._thing(u, sum(y) / 2, z, low)
+            self.thing(u, sum(y) / 2, z, low)
 
     def top(self, w: float, y: Span, z: float, x: float = 0.0, *, low: bool = False) -> None:
         """Decorate a surface that people can reach, and mark places where further objects can lie.
@@ -184,9 +184,10 @@ class Builder:
             if y[1] - y[0] >= SHALLOW_TOP and (deep or not is_decorated):
                 self.places.append((u, max(y[1] - 0.19, sum(y) / 2), z))
             if self.chance(0.6) if deep else is_decorated:
-                self._thing(u, y[0] + 0.15 if deep else sum(y) / 2, z, low)
+                self.thing(u, y[0] + 0.15 if deep else sum(y) / 2, z, low)
 
-    def _thing(self, x: float, y: float, z: float, low: bool) -> None:
+    def thing(self, x: float, y: float, z: float, low: bool) -> None:
+        """Add a small object on a surface of height `z`. If `low` is True, it is at most 0.13 m tall."""
         getattr(self, f"_{self.pick(*_LOW, *(() if low else _TALL))}")(x, y, z)
 
     def _frame(self, x: float, y: float, z: float) -> None:

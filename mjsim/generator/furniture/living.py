@@ -7,7 +7,9 @@ from mjsim.generator.furniture.artwork import painting
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.piece import Piece, group, pushed_in
 
-VIEW = (1.2, 3.4)  # range of distances from a television to a sofa at the opposite wall, in metres
+FREE = 1.2  # minimum depth of the free floor between a television and the seats, in metres
+VIEW = 3.4  # maximum distance between the fronts of a television and of the seats, in metres
+OFF_GRID = 0.0005  # offset of a rug's edges from the faces of legs, which would flicker with them, in metres
 
 
 def television(b: Builder) -> Piece:
@@ -36,12 +38,15 @@ def lounge(b: Builder) -> Piece:
     sofa = b.draw(kind, b.smaller)
     deep, gap = focus.size[1], (b.pick(2.1, 2.4, 2.7), b.pick(2.0, 2.2), 1.7, 1.4)[min(b.smaller, 3)]
     depth, aside, _ = b.fit or (0.0, 0.0, 0.0)
+    seat = sofa.parts[0].spot[3]
+    longest = VIEW - (deep - focus.parts[0].spot[3]) - (sofa.size[1] - seat)
     across = depth - deep - sofa.size[1]
-    gap = across if VIEW[0] < across < VIEW[1] else gap
+    gap = across if FREE < across < longest else min(gap, longest)
     back = deep + gap + sofa.size[1]
     members = [(focus, aside, 0.0, 0.0), (sofa, 0.0, back, math.pi)]
-    front = back - sofa.size[1] if not corner else back - 0.92
-    table = b.draw(tables.coffee_table, b.smaller)
+    front = back - seat
+    # A full-size table would reach into the long part of a corner sofa.
+    table = b.draw(tables.coffee_table, b.smaller + corner)
     long = sofa.parts[-1].spot
     # The sofa is rotated by half a turn, which swaps left and right.
     x = math.copysign(0.46, long[0] + long[2]) if corner else 0.0
@@ -50,8 +55,8 @@ def lounge(b: Builder) -> Piece:
         members.append((table, x, y, 0.0))
     if b.smaller < 3 and b.chance(0.85):
         wide, half = min(b.pick(2.0, 2.4), sofa.size[0]), min(gap / 2 - 0.1, b.pick(0.7, 0.85))
-        rug = b.draw(decoration.rug, fit=(wide, 2 * half, 0.0))
-        members.append((rug, 0.0, (deep + front) / 2 + 0.25 - half, 0.0))
+        rug = b.draw(decoration.rug, fit=(wide + 2 * OFF_GRID, 2 * (half + OFF_GRID), 0.0))
+        members.append((rug, 0.0, (deep + front) / 2 + 0.25 - half - OFF_GRID, 0.0))
     use = (aside - 0.4, deep, aside + 0.4, deep + 0.6)
     return group(b.kind, members, use=(use,))
 

@@ -5,8 +5,8 @@ room, and the +z axis points up. Lengths are in metres.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -66,17 +66,17 @@ class Mount:
 
 @dataclass(frozen=True)
 class DrawnTexture:
-    """A texture that is drawn for a single piece. Its material has the same name."""
+    """A texture for a single piece. Its material has the same name."""
 
     name: str
-    png: bytes
+    draw: Callable[[], bytes] = field(compare=False)  # returns the PNG file
 
     @property
     def assets(self) -> tuple[Asset, Asset]:
         image = f"{self.name}_image"
         texture = f'<texture name="{image}" type="2d" file="{image}.png"/>'
         material = f'<material name="{self.name}" texture="{image}"/>'
-        return Asset(image, texture, self.png), Asset(self.name, material)
+        return Asset(image, texture, self.draw()), Asset(self.name, material)
 
 
 @dataclass(frozen=True)

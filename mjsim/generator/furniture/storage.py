@@ -3,6 +3,8 @@
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.piece import Piece
 
+TALL = 0.32  # minimum height of a compartment for tall objects, in metres
+
 
 def _wardrobe(b: Builder, mirrored: bool) -> Piece:
     w, d, h = b.size(1.0, 2.2, 0.2), 0.6, b.pick(2.0, 2.1, 2.2)
@@ -58,7 +60,7 @@ def _filled(b: Builder, w: float, z: float, high: float, d: float, x: float) -> 
         material = b.pick("wicker", b.cloth2)
         b.box(material, 0.85 * w if w < 0.6 else 0.4, (0.05, d - 0.03), (z, z + 0.7 * high), x, seen=True)
     elif what == "thing":
-        b.clutter(0.3, (0.1, d - 0.08), z, 1)
+        b.thing(x, d / 2 + 0.01, z, high < TALL)
 
 
 def _frame(

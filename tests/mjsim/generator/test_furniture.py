@@ -9,11 +9,12 @@ from houses_cases import PALETTE, compiled
 from mjsim.generator.furniture.appearance import Appearance, draw_appearance
 from mjsim.generator.furniture.catalogue import KINDS
 from mjsim.generator.furniture.drawn_boxes import drawn_boxes
-from mjsim.generator.furniture.piece import BIN_SIZES, Piece, intersect
+from mjsim.generator.furniture.piece import BIN_SIZES, Piece, Point, flattened, intersect, moved_boxes
 from mjsim.house.validation.checked_model import Compiled
 from mjsim.house.validation.drawn import coplanar_faces
 
 SLACK = 0.03  # m
+Members = list[tuple[str, float, float, np.ndarray]]  # kinds, positions and drawn boxes
 
 
 @pytest.fixture(scope="module")
@@ -28,8 +29,8 @@ def pieces(request: pytest.FixtureRequest, look: Appearance) -> list[tuple[Piece
     return [(piece, compiled(piece, look)) for piece in made]
 
 
-def make(kind: str, look: Appearance, seed: int, smaller: int = 0) -> Piece:
-    return KINDS[kind].make(np.random.default_rng(seed), look, smaller=smaller)
+def make(kind: str, look: Appearance, seed: int, smaller: int = 0, fit: Point | None = None) -> Piece:
+    return KINDS[kind].make(np.random.default_rng(seed), look, smaller=smaller, fit=fit)
 
 
 def extents(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
@@ -128,6 +129,65 @@ def test_no_faces_of_a_piece_flicker(pieces: list[tuple[Piece, mujoco.MjModel]])
     for piece, model in pieces:
         found = coplanar_faces(Compiled.of("piece", Path("piece.xml"), model))
         assert not [f for f in found if f.place[1] > 0.002], piece.kind  # the back faces a wall
+
+
+@pytest.mark.parametrize("kind", ["low_bookcase", "cube_shelf", "bookcase"])
+def test_things_in_a_shelf_do_not_reach_through_its_boards(kind: str, look: Appearance) -> None:
+    for seed in range(40):
+        piece = make(kind, look, seed)
+        sizes = piece.drawn[:, 3:] - piece.drawn[:, :3]
+        upright = np.isclose(sizes[:, 0], 0.024) & (sizes[:, 2] > 0.5)
+        frame = upright | (sizes[:, 0] > piece.size[0] - 0.049)
+        assert upright.sum() >= 2
+        assert not intersect(piece.drawn[frame], piece.drawn[~frame]), seed
+
+
+def test_the_texture_of_a_picture_follows_from_its_seed(look: Appearance) -> None:
+    one, same, other = (make("picture", look, seed).pictures[0] for seed in (1, 1, 2))
+    assert one.name == same.name != other.name
+    assert one.draw() == one.draw() == same.draw() != other.draw()
+
+
+def test_a_table_is_apart_from_the_long_part_of_a_corner_sofa(look: Appearance) -> None:
+    lounge = make("lounge", look, 392)  # has the narrowest corner sofa, and without a limit the widest table
+    boxes = {piece.kind: moved_boxes(piece.drawn, *pose) for piece, *pose in flattened(lounge)}
+    around = boxes["coffee_table"] + np.array([-0.08, -0.08, 0.0, 0.08, 0.08, 0.0])
+    assert not intersect(boxes["corner_sofa"], around)
+
+
+@pytest.fixture(scope="module")
+def lounges(look: Appearance) -> list[Members]:
+    """The members of lounges in deep rooms."""
+    fits = ((5.06, -0.8, 0.0), (5.06, 0.0, 0.0), (5.26, 0.8, 0.0))
+    return [
+        [
+            (piece.kind, x, y, moved_boxes(piece.drawn, x, y, yaw))
+            for piece, x, y, yaw in flattened(make("lounge", look, seed, seed % 3, fits[seed % 3]))
+        ]
+        for seed in range(41, 75)
+    ]
+
+
+def test_the_seats_of_a_lounge_are_near_its_television_or_stove(
+    lounges: list[Members],
+) -> None:
+    for lounge in lounges:
+        at = {kind: (x, y) for kind, x, y, _ in lounge}
+        focus = at.get("television") or at["stove"]
+        assert math.dist(focus, at.get("sofa") or at["corner_sofa"]) < 5.0
+
+
+def test_the_edges_of_a_rug_are_not_flush_with_the_legs_on_it(
+    lounges: list[Members],
+) -> None:
+    for lounge in lounges:
+        others = np.concatenate([drawn for kind, *_, drawn in lounge if kind != "rug"])
+        legs = others[others[:, 2] < 0.001]
+        for rug in (drawn[0] for kind, *_, drawn in lounge if kind == "rug"):
+            for axis, across in ((0, 1), (1, 0)):
+                beside = (legs[:, across] < rug[across + 3]) & (legs[:, across + 3] > rug[across])
+                gaps = legs[beside][:, [axis, axis + 3]] - rug[[axis, axis + 3]]
+                assert np.abs(gaps).min(initial=1.0) > 0.0003
 
 
 def test_bins_on_furniture_overlap_nothing(pieces: list[tuple[Piece, mujoco.MjModel]]) -> None:
