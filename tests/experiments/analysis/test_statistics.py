@@ -136,6 +136,13 @@ def test_tests_of_a_pair_that_decide_differently_are_marked():
     assert [pair.agrees() for pair in found] == [False, True, False]
 
 
+def test_a_group_without_variance_is_compared_by_tukey_alone():
+    rng = np.random.default_rng(1)
+    found = compare_pairs({"a": np.full(20, 3.0), "b": rng.normal(size=20), "c": rng.normal(size=20)}, 0.5)
+    assert [pair.games_howell_p is None for pair in found] == [True, True, False]
+    assert [pair.holm_p is None for pair in found] == [True, True, False]
+
+
 def test_verdicts_need_evidence():
     """No difference is not equivalence: few people are undecided, many equal ones equivalent."""
     rng = np.random.default_rng(2)

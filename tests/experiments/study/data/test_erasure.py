@@ -126,6 +126,21 @@ def test_nothing_is_said_about_files_that_do_not_contain_the_person(served, tmp_
     assert traces(tmp_path, "dora", "d" * 64) == []
 
 
+def test_a_backup_in_which_a_payment_was_owed_is_changed_too(served, tmp_path):
+    async def pay(*events):
+        store = await _open(served)
+        for event, *values in events:
+            await getattr(store.ledger, event)(*values)
+        await store.close()
+
+    asyncio.run(pay(("decide", 2, "reward", 750, "USD", "p00002-reward"), ("begin_sending", "p00002-reward")))
+    assert main(["study", "backup", *served, "--out", str(tmp_path / "owed.db")]) == 0
+    asyncio.run(pay(("confirm", "p00002-reward", 1, "a receipt")))
+    assert traces(tmp_path, "bert-PID")
+    assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 0
+    assert traces(tmp_path, "bert-PID") == []
+
+
 def test_a_copy_that_was_moved_is_named(served, tmp_path, capsys):
     moved = [tmp_path / "backup.db", tmp_path / "runs.csv", tmp_path / "served" / "restored.db"]
     assert main(["study", "restore", str(moved[0]), str(moved[2])]) == 0

@@ -174,7 +174,9 @@ def test_a_platform_in_trouble_pays_once(paid, fault):
     again = paid.send()
     assert {key: sent.state for key, sent in again.items()} == dict.fromkeys(first, "in doubt")
     paid.wait()
+    before = paid.platform.moves
     assert all(sent.state == "paid" for sent in paid.send().values())
+    assert paid.platform.moves - before == (0 if fault.endswith("after") else 3), "only what it lacks is sent"
     paid.check()
 
 

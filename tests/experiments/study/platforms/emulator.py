@@ -23,12 +23,13 @@ class Emulator:
             `500`, `hang` and `garbage` with ` before` or ` after` the platform did what it was asked for.
         stuck: Set once a request hangs.
         asked: Requests of the API: methods and paths.
+        moves: How many requests were to move money.
         url: Where it is, without a slash at the end.
     """
 
     def __init__(self):
         self.faults, self.asked, self.stuck = deque(), [], threading.Event()
-        self.url, self.lock = "", threading.Lock()
+        self.url, self.lock, self.moves = "", threading.Lock(), 0
         self._app = Starlette(routes=self.routes())
 
     def routes(self):
@@ -54,7 +55,8 @@ class Emulator:
             await PlainTextResponse("who are you?", 401)(scope, receive, send)
             return
         self.asked.append((scope["method"], headers.get("x-amz-target") or scope["path"]))
-        fault = self.faults.popleft() if self.faults and self.moves_money(scope) else ""
+        self.moves += (moves := self.moves_money(scope))
+        fault = self.faults.popleft() if self.faults and moves else ""
         await self._with_fault(fault, scope, receive, send)
 
     async def _with_fault(self, fault, scope, receive, send):

@@ -143,6 +143,20 @@ def test_only_new_people_count_towards_the_limit_of_an_address(tmp_path, monkeyp
     monkeypatch.undo()
 
 
+def test_a_person_who_asks_twice_at_once_counts_once(tmp_path, monkeypatch):
+    """No request sees in the database that another one has just begun the visit."""
+
+    async def nobody(*_):
+        return None
+
+    monkeypatch.setattr("experiments.visit.server.admission.NEW_PEOPLE", (3, 60.0))
+    monkeypatch.setattr("experiments.visit.server.admission.Admission._known", nobody)
+    recruitment = f'[study.recruitment]\nplatform = "prolific"\n{CODES}'
+    with served(tmp_path, PHASES + recruitment) as site, site.client() as client:
+        assert len({site.begin(client, **ids(number)) for number in (0, 0, 1, 1, 0, 2)}) == 3
+        assert client.post("/begin", data=ids(3)).status_code == 429
+
+
 def test_a_machine_lets_in_as_many_as_its_cores_hold(monkeypatch):
     clock = SimpleNamespace(now=0.0)
     clock.monotonic, clock.process_time = (lambda: clock.now), (lambda: 0.0)

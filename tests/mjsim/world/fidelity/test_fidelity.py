@@ -134,6 +134,25 @@ def test_a_path_in_one_call_is_walked_as_step_by_step(house, fidelity):
             fetch(singly, name)
 
 
+def test_a_walk_in_one_call_ends_with_an_event(house, monkeypatch):
+    """As when an object is lost, so that the person can decide anew."""
+    world, steps = settled(house, "full"), []
+    step = world._tier.step
+
+    def step_with_event(action):
+        result = step(action)
+        steps.append(action)
+        if len(steps) == 3:
+            world._tier.episode_state.report(world.observation().time, EventKind.DISLODGED, 0)
+        return result
+
+    monkeypatch.setattr(world._tier, "step", step_with_event)
+    corners = np.array([world.observation().position, (2.2, 2.0)])
+    done = world.step(FollowPath(corners, corners[-1], 0.05, shown=True, tolerance=2.0))
+    assert (len(done.steps), len(steps), done.stopped) == (3, 3, Stop.EVENT)
+    assert [event.kind for event in done.events] == [EventKind.DISLODGED]
+
+
 @tiers
 def test_a_walk_stops_when_it_is_due_off_its_path_or_blocked(house, fidelity):
     world = settled(house, fidelity)
