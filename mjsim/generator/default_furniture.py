@@ -3,11 +3,11 @@
 Options = tuple[str, ...]
 
 REQUIRED: dict[str, tuple[Options, ...]] = {  # each room gets one piece from each tuple
-    "bedroom": (("double_bed", "double_bed"),),
+    "bedroom": (("double_bed",),),
     "child": (("single_bed", "bunk_bed"),),
     "studio": (("double_bed", "single_bed"),),
-    "bathroom": (("bathtub", "shower"), ("toilet", "toilet"), ("washbasin", "washbasin")),
-    "shower_room": (("shower", "shower"), ("toilet", "toilet"), ("washbasin", "washbasin")),
+    "bathroom": (("bathtub", "shower"), ("toilet",), ("washbasin",)),
+    "shower_room": (("shower",), ("toilet",), ("washbasin",)),
 }
 PLANTS: Options = ("bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
 _SHELVES: Options = ("bookcase", "low_bookcase", "cube_shelf", "ladder_shelf")

@@ -185,10 +185,7 @@ class FurnishedHome:
         return any(self.put(space, kind, largest=size, smallest=size) for size, kind in choices)
 
     def _put_any(self, space: Space, kinds: Sequence[str]) -> None:
-        order = list(kinds)
-        if kinds[0] != kinds[-1]:
-            order = [kinds[i] for i in space.rng.permutation(len(kinds))]
-        if not any(self.put(space, kind) for kind in order):
+        if not any(self.put(space, kinds[i]) for i in space.rng.permutation(len(kinds))):
             raise HouseError(f"no place for {' or '.join(kinds)} in {space.room.key} of seed {self.seed}")
 
     def _put_lounges(self) -> None:

@@ -41,7 +41,7 @@ def _texture(
 def _painted(rng: np.random.Generator, look: Appearance, wide: int, high: int) -> Image:
     y, x = np.mgrid[0:high, 0:wide] / np.array([high, wide]).reshape(2, 1, 1)
     colours = _palette(rng, look, 6)
-    image = (0.75 + 0.25 * colours[0]) * (1 - 0.25 * y[..., None])
+    image: Image = (0.75 + 0.25 * colours[0]) * (1 - 0.25 * y[..., None])
     _STYLES[int(rng.integers(len(_STYLES)))](rng, image, x, y, colours)
     return image
 

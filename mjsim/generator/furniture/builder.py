@@ -163,14 +163,12 @@ class Builder:
         else:
             self.box(self.metal, min(0.18, 0.4 * wide), out, (v - 0.007, v + 0.007), u, seen=True)
 
-    def clutter(
-        self, w: float, y: Span, z: float, most: int = 3, x: float = 0.0, *, low: bool = False
-    ) -> None:
+    def clutter(self, w: float, y: Span, z: float, most: int = 3, x: float = 0.0) -> None:
         """Add a row of small objects on a surface; see `thing`."""
         places = int(np.clip(w // 0.35, 1, most))
         for i in range(int(self.rng.integers(1, places + 1))):
             u = x + w * ((i + 0.5) / places - 0.5) + 0.05 * float(self.rng.uniform(-1, 1))
-            self.thing(u, sum(y) / 2, z, low)
+            self.thing(u, sum(y) / 2, z)
 
     def top(self, w: float, y: Span, z: float, x: float = 0.0, *, low: bool = False) -> None:
         """Decorate a surface that people can reach, and mark places where further objects can lie.
@@ -186,7 +184,7 @@ class Builder:
             if self.chance(0.6) if deep else is_decorated:
                 self.thing(u, y[0] + 0.15 if deep else sum(y) / 2, z, low)
 
-    def thing(self, x: float, y: float, z: float, low: bool) -> None:
+    def thing(self, x: float, y: float, z: float, low: bool = False) -> None:
         """Add a small object on a surface of height `z`. If `low` is True, it is at most 0.13 m tall."""
         getattr(self, f"_{self.pick(*_LOW, *(() if low else _TALL))}")(x, y, z)
 
