@@ -20,9 +20,7 @@ from planner.task_problems import TaskProblems
 MOVED = 0.3  # displacement of an object beyond which a new plan is made, in metres
 TIE = 0.01  # difference in length below which two tours count as equal, in metres
 PROOF_LIMIT = SolveLimit(seconds=20.0)
-CUTS_LIMIT = SolveLimit(
-    work=700_000
-)  # limit of a first plan by branch and cut, which allows about four nodes
+CUTS_LIMIT = SolveLimit(work=700_000)  # allows about four nodes in a first plan by branch and cut
 
 
 @dataclass(eq=False)
