@@ -29,6 +29,7 @@ from mjsim.world.state import CHECKPOINT_PERIOD, WorldState, engine_versions, mo
 from mjsim.world.world import World
 
 FIRST_CAPACITY = 4096  # initial number of allocated rows, which is doubled when all are used
+MAX_SMALL_OBJECTS = 24  # maximum number of objects in sessions whose arrays are compressed as far as possible
 NOTHING_FILMED = "none: nothing was filmed"  # value of `renderer` in a run without a film
 
 
@@ -239,9 +240,10 @@ def _write(folder: Path, record: Record, metrics: dict[str, Any]) -> None:
     with replacing(folder / records.EVENTS) as path:
         path.write_bytes(record.log)
     # Use the slower compression for sessions of human participants, which are longer than trials of a batch.
-    played = record.participant is not None
-    save_arrays(folder / records.TRAJECTORY, record.trajectory, small=played)
-    save_arrays(folder / records.RECORDING, record.recording, small=played)
+    # With many objects, it would delay the end of a session by 3 s. Their files are three times as large.
+    small = record.participant is not None and len(record.episode.objects) <= MAX_SMALL_OBJECTS
+    save_arrays(folder / records.TRAJECTORY, record.trajectory, small=small)
+    save_arrays(folder / records.RECORDING, record.recording, small=small)
     write_json(folder / records.PLAN, record.plans)
     write_json(folder / records.METRICS, metrics)  # marks the run directory as complete
     write_checksums(folder, records.FILES)

@@ -111,10 +111,7 @@ class TaskSearch:
         if by_cuts:
             best = self._bounded(problem, instance, seed, Deadline.of(limit))
         else:
-            from planner.exact.search import (
-                WARM_ROWS,
-                improving_tours,
-            )  # imported here because it takes 0.5 s
+            from planner.exact.search import WARM_ROWS, improving_tours  # this import takes 0.5 s
 
             rows, start = HURRIED_ROWS if stopped else WARM_ROWS, self.start(problem, instance)
             passes, end = self._solver.passes, Deadline.of(limit)

@@ -4,6 +4,7 @@ import pytest
 from planning_cases import Task, two_rooms
 
 from planner.checker import check
+from planner.exact.cuts import branch_and_cut
 from planner.exact.solver import ExactSolver
 from planner.plan import Status
 from planner.solver_source import SolverSource
@@ -51,3 +52,13 @@ def test_a_table_is_filled_once_while_nothing_is_moved(geodesics, monkeypatch):
     task.loose["object_00"] = task.anywhere()  # a delivered object has been moved to another place
     assert planner.plan(task.state, None, shown=False).visits
     assert len(filled) == 2
+
+
+def test_a_first_plan_by_branch_and_cut_may_search_fewer_nodes_than_the_planner_alone(geodesics, monkeypatch):
+    nodes = []
+    monkeypatch.setattr(branch_and_cut, "integer_flow", lambda model, most, deadline: nodes.append(most))  # noqa: ARG005
+    task, planner = Task(geodesics, 14, 1), ExactSolver(table_bytes=0, most_searched=0)
+    SolverSource(geodesics, planner).plan(task.state, None, shown=True)
+    few = max(nodes)
+    planner.solve(TaskProblems(geodesics).problem(task.state))
+    assert 1 <= few <= 15 < max(nodes)

@@ -87,21 +87,41 @@ def test_carried_objects_move_with_the_person(runs):
     assert gap.max() < 1.3
 
 
+def run_twice(folder, *words):
+    """Check that a command writes the same files in two processes. Return the first run and its metrics."""
+    for name in ("one", "two"):
+        command = [sys.executable, "-m", "experiments.cli.main", "run", *words, "--out", str(folder / name)]
+        subprocess.run(command, check=True, capture_output=True, timeout=600)
+    files = {path.name for path in (folder / "one").iterdir()}
+    assert files == {path.name for path in (folder / "two").iterdir()}
+    for name in (files & {*records.FILES}) - {records.METRICS}:
+        assert (folder / "one" / name).read_bytes() == (folder / "two" / name).read_bytes(), name
+    first, second = (read_json(folder / name / records.METRICS) for name in ("one", "two"))
+    del first["wall_s"], second["wall_s"]
+    assert first == second
+    return folder / "one", first
+
+
 @pytest.mark.slow
 def test_the_same_command_twice_gives_the_same_bytes(tmp_path):
-    words = ["run", "--objects", "6", "--seed", "1", "--time-limit", "5", "--size", "320x240", "--out"]
-    for name in ("one", "two"):
-        command = [sys.executable, "-m", "experiments.cli.main", *words, str(tmp_path / name)]
-        subprocess.run(command, check=True, capture_output=True, timeout=120)
-    for name in {*records.FILES} - {records.VIDEO, records.METRICS}:
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
-    metrics = [read_json(tmp_path / name / records.METRICS) for name in ("one", "two")]
-    for values in metrics:
-        del values["wall_s"]
-    assert metrics[0] == metrics[1]
-    assert len(metrics[0]["frames_sha256"]) == 64
-    with av.open(str(tmp_path / "one" / records.VIDEO)) as container:
+    words = ("--objects", "6", "--seed", "1", "--time-limit", "5", "--size", "320x240")
+    run, metrics = run_twice(tmp_path, *words)
+    assert len(metrics["frames_sha256"]) == 64
+    with av.open(str(run / records.VIDEO)) as container:
         assert sum(1 for _ in container.decode(video=0)) == 125
+
+
+@pytest.mark.slow
+def test_a_run_with_forty_objects_repeats_and_replays(house, tmp_path):
+    """The participant deviates often, so each method of the planner is used."""
+    words = ("--objects", "40", "--seed", "2", "--user", "boltzmann:0.5", "--fidelity", "event", "--no-video")
+    run, metrics = run_twice(tmp_path, *words)
+    visits = [e for e in read_events(run / records.EVENTS) if e["event"] == "visit"]
+    assert (metrics["ended"], metrics["delivered"], metrics["assistance"]) == ("all delivered", 40, "optimal")
+    assert metrics["nd_feasible"] > 0
+    assert len(visits) == metrics["visits"]
+    assert all(e["regret_m"] is not None or e["regret_bounds_m"] is not None for e in visits)
+    assert replay(run, house=house).ended == "all delivered"
 
 
 @pytest.mark.parametrize("fidelity", FIDELITIES)

@@ -4,6 +4,7 @@ import itertools
 import os
 import shutil
 import socket
+import zipfile
 from pathlib import Path
 
 import msgspec
@@ -13,7 +14,7 @@ import pytest
 from experiments.record.files import CHECKSUMS, read_arrays, read_json, save_arrays, write_checksums
 from experiments.record.journal import read_entries
 from experiments.record.reader import read_journal
-from experiments.record.records import EVENTS, FILES, METRICS, TOPDOWN, TRAJECTORY
+from experiments.record.records import EVENTS, FILES, METRICS, RECORDING, TOPDOWN, TRAJECTORY
 from experiments.record.verify import damage
 from experiments.trials.replay.replay import replay
 from experiments.trials.trial_config import TrialConfig
@@ -88,6 +89,17 @@ def test_a_session_resumes_in_the_same_state_with_the_same_plan(house, tmp_path,
     assert state(resumed)[:3] == state(whole)[:3]
     for session in (whole, resumed):
         session.end("interrupted")
+
+
+@pytest.mark.parametrize(("objects", "method"), [(24, zipfile.ZIP_LZMA), (40, zipfile.ZIP_DEFLATED)])
+def test_a_session_with_many_objects_is_saved_with_the_faster_compression(house, tmp_path, objects, method):
+    config = msgspec.structs.replace(CONFIG, objects=objects)
+    play(tmp_path / "session", house, wandering(1, 20), config=config).end("interrupted")
+    save_run(tmp_path / "session", tmp_path / "run", floor_plan=False)
+    for name in (TRAJECTORY, RECORDING):
+        with zipfile.ZipFile(tmp_path / "run" / name) as archive:
+            assert {member.compress_type for member in archive.infolist()} == {method}
+    assert replay(tmp_path / "run", house=house).steps == 20
 
 
 def test_a_german_session_shows_german_and_leaves_the_bytes_of_an_english_one(house, tmp_path):
