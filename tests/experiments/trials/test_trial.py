@@ -112,6 +112,7 @@ def test_the_same_command_twice_gives_the_same_bytes(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_run_with_forty_objects_repeats_and_replays(house, tmp_path):
     """The participant deviates often, so each method of the planner is used."""
     words = ("--objects", "40", "--seed", "2", "--user", "boltzmann:0.5", "--fidelity", "event", "--no-video")
