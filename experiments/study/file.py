@@ -33,9 +33,8 @@ Code = Annotated[str, msgspec.Meta(pattern=r"^[0-9A-Za-z_-]{0,64}\Z")]
 Site = Annotated[str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?\Z")]
 
 MAX_MINIMUM_S = 86400
-BINS = re.compile(
-    r"\{(bins|categories|count)\}", re.IGNORECASE
-)  # placeholders in a story that depend on the house
+# Placeholders in a story that depend on the house
+BINS = re.compile(r"\{(bins|categories|count)\}", re.IGNORECASE)
 HERE = ("localhost", "127.0.0.1", "::1")  # hosts that may be contacted without TLS
 
 

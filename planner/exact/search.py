@@ -16,10 +16,8 @@ from planner.exact.warm_start import Start
 from planner.plan import Certificate, Proof
 from planner.solvers import NEVER, Deadline
 
-MOVES, TEMPERATURES = (
-    10_000,
-    (0.5, 0.01),
-)  # annealing of a first tour; temperatures are relative to the mean leg
+# Moves of the annealing of a first tour, and its temperatures relative to the mean leg
+MOVES, TEMPERATURES = 10_000, (0.5, 0.01)
 # Limits for finding a first plan from a warm start, in about 20 ms
 WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
 WARM_TEMPERATURES = (0.1, 0.02)

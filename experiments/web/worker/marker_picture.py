@@ -22,10 +22,8 @@ from mjsim.render import Renderer
 from mjsim.support.files import write_text_atomically
 from mjsim.values.episode import Episode, PlacedObject, StartPose
 
-OBJECTS, SEED = (
-    14,
-    2**31 - 1,
-)  # largest number of sampled objects, and their seed, which no study uses by chance
+OBJECTS = 14  # largest number of sampled objects
+SEED = 2**31 - 1  # of the objects; no study uses this seed by chance
 AHEAD = 2.5  # preferred length of the path to the object in the picture, in metres
 SIZE = (640, 400)  # size of the picture in pixels
 

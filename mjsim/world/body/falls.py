@@ -40,7 +40,7 @@ def _falls(arrays: Any, first: int, second: int) -> bool:
     qvel, xmat, dofs, bodies, radii = arrays
     for item in range(len(dofs)):
         dof = dofs[item]
-        if item == first or item == second:
+        if item in (first, second):
             if qvel[dof] ** 2 + qvel[dof + 1] ** 2 + qvel[dof + 2] ** 2 > MAX_SWING**2:
                 return True
             continue
