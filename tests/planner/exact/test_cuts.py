@@ -92,7 +92,11 @@ def test_integer_rounds_alone_connect_the_flow(monkeypatch):
     monkeypatch.setattr(branch_and_cut, "REPAIR_MOVES", 1)
     monkeypatch.setattr(branch_and_cut, "ROUNDS", 1)
     monkeypatch.setattr(branch_and_cut, "CORE", 120)
-    monkeypatch.setattr(branch_and_cut, "joined", lambda _, pieces: np.concatenate(pieces).astype(np.int64))
+
+    def in_order(_, way, cycles):
+        return np.concatenate([way, *cycles]).astype(np.int64)
+
+    monkeypatch.setattr(branch_and_cut, "inserted", in_order)
     branched = []
     for seed in range(12):
         problem = dataclasses.replace(random_problem(seed, 9, seed % 3), resolution=1e-4)
