@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from planner.errors import UnreachableError
 from planner.navmesh import TOLERANCE, NavMesh
-from planner.visibility_graph import View, VisibilityGraph, direct_distances, visible_vertices
+from planner.visibility_graph import VisibilityGraph, VisibleVertices, direct_distances, visible_vertices
 
 MAX_CACHED = 4096  # maximum number of points for which visible vertices are cached
 
@@ -29,7 +29,7 @@ class ShortestPath:
 class _Query:
     points: NDArray[np.float64]
     island: NDArray[np.int64]
-    views: list[View]
+    views: list[VisibleVertices]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,9 @@ class Geodesics:
     navmesh: NavMesh
     max_snap: float = 1.0  # maximum distance from a point to the nearest navigable point, in metres
     _graph: VisibilityGraph = field(init=False, repr=False)
-    _remembered: dict[tuple[float, float], View] = field(init=False, repr=False, default_factory=dict)
+    _remembered: dict[tuple[float, float], VisibleVertices] = field(
+        init=False, repr=False, default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_graph", VisibilityGraph.build(self.navmesh))
@@ -101,14 +103,14 @@ class Geodesics:
         views = [self._view(x, y, i) for (x, y), i in zip(points.tolist(), islands.tolist(), strict=True)]
         return _Query(points, islands, views)
 
-    def _view(self, x: float, y: float, island: int) -> View:
+    def _view(self, x: float, y: float, island: int) -> VisibleVertices:
         view = self._remembered.get((x, y))
         if view is None:
             if len(self._remembered) >= MAX_CACHED:
                 self._remembered.clear()
             graph = self._graph
             usable = graph.island == island
-            view = View(*visible_vertices(x, y, graph.vertices, usable, graph.walls, TOLERANCE))
+            view = VisibleVertices(*visible_vertices(x, y, graph.vertices, usable, graph.walls, TOLERANCE))
             self._remembered[x, y] = view  # another thread may clear the cache, so do not read it again
         return view
 

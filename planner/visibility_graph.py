@@ -22,7 +22,7 @@ from planner.navmesh import TOLERANCE, NavMesh
 REPEATED = 1e-9  # distance below which two corners of a path are merged, in metres
 
 
-class View(NamedTuple):
+class VisibleVertices(NamedTuple):
     """The vertices that are visible from a point."""
 
     seen: NDArray[np.int32]  # indices of the vertices, in ascending order, shape (k,)
@@ -53,14 +53,16 @@ class VisibilityGraph:
         )
         return cls(vertices=vertices, island=island.astype(np.int64), walls=walls, edges=edges)
 
-    def distances(self, sources: Sequence[View], targets: Sequence[View]) -> NDArray[np.float64]:
+    def distances(
+        self, sources: Sequence[VisibleVertices], targets: Sequence[VisibleVertices]
+    ) -> NDArray[np.float64]:
         """Return the lengths of shortest paths via vertices in metres, infinite without a path, shape (s, t)."""
         over, _ = self._paths(sources)
         found = [(over[:, seen] + lengths).min(axis=1, initial=np.inf) for seen, lengths in targets]
         return np.array(found).reshape(len(targets), len(sources)).T
 
     def shortest_path(
-        self, ends: NDArray[np.float64], start: View, goal: View
+        self, ends: NDArray[np.float64], start: VisibleVertices, goal: VisibleVertices
     ) -> tuple[float, NDArray[np.float64]]:
         """Return the length and the points of the shortest path via vertices between two points, in metres.
 
@@ -81,7 +83,7 @@ class VisibilityGraph:
                 points.append(corner)
         return float(totals[last]), np.array([*points, ends[1]])
 
-    def _paths(self, views: Sequence[View]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    def _paths(self, views: Sequence[VisibleVertices]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Return the length of the shortest path from each point to each vertex, and the vertices before the last one.
 
         The points are nodes without entering edges, numbered after the vertices.

@@ -27,7 +27,7 @@ PRESS_GAP = 15  # shortest time between two key presses, in control steps
 
 
 def homes_in(folders: VisitFolders) -> Callable[[str], House]:
-    """Return a function that loads the house in which the participant with a link plays."""
+    """Return a function that takes a participant's link and loads the house of this participant's task."""
     load = functools.lru_cache(MAX_HOUSES)(House.load)
 
     def home(link: str) -> House:

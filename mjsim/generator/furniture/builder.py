@@ -164,7 +164,7 @@ class Builder:
             self.box(self.metal, min(0.18, 0.4 * wide), out, (v - 0.007, v + 0.007), u, seen=True)
 
     def clutter(self, w: float, y: Span, z: float, most: int = 3, x: float = 0.0) -> None:
-        """Add a row of small objects on a surface; see `thing`."""
+        """Add a row of small objects on a surface, as the method `thing` makes them."""
         places = int(np.clip(w // 0.35, 1, most))
         for i in range(int(self.rng.integers(1, places + 1))):
             u = x + w * ((i + 0.5) / places - 0.5) + 0.05 * float(self.rng.uniform(-1, 1))
