@@ -120,15 +120,23 @@ def _hand_in_body(person: Person, receptacle: ReceptacleGeometry, local: Vector)
 
 
 def _travel(person: Person, hand: int, receptacle: ReceptacleGeometry, hover: Vector) -> Steps:
+    """Move a hand up and sideways until it is in front of `hover`, then forward over the receptacle.
+
+    On a straight line, a load would hit furniture beside the receptacle.
+    """
     target = person.rig.hand_targets[hand]
+    start = target.copy()
 
     def above() -> Vector:
         return _hand_in_body(person, receptacle, hover)
 
-    up = np.array([target[0], target[1], max(target[2], above()[2])])
-    for goal in (lambda: up, above):
+    def before() -> Vector:
+        _, left, up = above()
+        return np.array([start[0], left, max(start[2], up)])
+
+    for goal, order in ((before, UP_FIRST), (above, STRAIGHT)):
         steps = person.travel_steps(float(np.linalg.norm(goal() - target)))
-        for _ in person.swing(hand, goal, steps, STRAIGHT):
+        for _ in person.swing(hand, goal, steps, order):
             person.glance(receptacle.center)
             yield
     for _ in range(person.steps(person.motion.hover_time)):

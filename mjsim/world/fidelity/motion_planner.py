@@ -160,8 +160,9 @@ class MotionPlanner:
     def _travel(self, receptacle: ReceptacleGeometry, hover: Vector) -> None:
         goal, person = receptacle.center + receptacle.rotation @ hover, self._person
         start, above = self._hand_position, self._in_body(goal)
-        up = np.array([start[0], start[1], max(start[2], above[2])])
-        self._move(up, person.travel_steps(float(np.linalg.norm(up - start))), gaze=receptacle.center)
+        before = np.array([start[0], above[1], max(start[2], above[2])])
+        steps = person.travel_steps(float(np.linalg.norm(before - start)))
+        self._move(before, steps, UP_FIRST, receptacle.center)
         distance = float(np.linalg.norm(self._in_body(goal) - self._hand_position))
         self._move(goal, person.travel_steps(distance), gaze=receptacle.center, in_house=True)
 

@@ -115,6 +115,17 @@ def test_a_load_goes_down_into_the_bin_by_a_person_who_stands_square_to_it_and_l
 
 
 @tiers
+def test_a_load_moves_sideways_before_it_moves_forward_so_that_it_passes_furniture_beside_the_bin(
+    small_catalogue, fidelity
+):
+    steps = placed(beside_the_crate(small_catalogue, fidelity))
+    loads = np.array([step.load for step in steps])
+    sideways, forward = abs(loads[:, 0] - loads[-1, 0]), loads[:, 1] - loads[0, 1]
+    assert sideways[0] > 0.2 and forward[-1] > 0.05
+    assert np.all(sideways[forward > 0.02] < 0.02)
+
+
+@tiers
 def test_the_gaze_goes_to_the_bin_while_the_load_travels_and_returns_after_the_release(
     small_catalogue, fidelity
 ):
