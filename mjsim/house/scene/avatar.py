@@ -50,7 +50,7 @@ PITCH_RANGE = (math.radians(-75.0), math.radians(60.0))
 REST = (0.34, 0.27, 1.00)
 CARRY = (0.50, 0.24, 1.25)
 TUCKED = (0.27, 0.19, 1.22)
-ASIDE = (0.30, 0.42, 1.26)
+ASIDE = (0.10, 0.42, 1.26)
 HAND_KP, HAND_KV = 2000.0, 130.0
 HAND_FORCE = 80.0
 # Parameters of each weld type: time constant in seconds, torque scale, minimum and maximum impedance. A
