@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.compiled.bounding_volumes import tighten
 from mjsim.house.compiled.house import compile_errors, compiled_house
 from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap
 from mjsim.house.scene.avatar import attach_avatar
@@ -169,7 +168,6 @@ def assemble(
             attach_avatar(spec, names, start=(start.x, start.y, start.heading), person=person)
         spec.dedup_assets()  # merge the assets, which were copied for every attached object
         model = spec.compile()
-    tighten(model)
     return Scene(
         model=model,
         episode=episode,
