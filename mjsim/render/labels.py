@@ -1,19 +1,16 @@
 """Instance and category labels for segmentation images."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.scene.scene import Scene
-from mjsim.values.errors import RenderError
 
 BACKGROUND = -1
 HOUSE, PERSON, RECEPTACLE = "house", "person", "receptacle"
 _PERSON_ROOT = "avatar/base"
-_SAME = 1e-6  # tolerance in metres for recognizing the same geom in two models
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +36,9 @@ class Labels:
         person = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, _PERSON_ROOT)
         if person >= 0:
             of_geom[:-1][model.body_rootid[model.geom_bodyid] == person] = 1
+        prefixes = [model.geom(geom).name.partition("/")[0] for geom in range(model.ngeom)]
         for number, key in enumerate(keys, start=2):
-            of_geom[:-1][_receptacle_geoms(scene, key)] = number
+            of_geom[:-1][[prefix == key for prefix in prefixes]] = number
         owner = scene.index.geom_owner
         of_geom[:-1][owner >= 0] = owner[owner >= 0] + 2 + len(keys)
         kinds = [placed.category for placed in scene.episode.objects]
@@ -61,38 +59,3 @@ class Labels:
         seen = self.instance_of_geom[segmentation].ravel()
         counts = np.bincount(seen[seen >= 0], minlength=len(self.instances))
         return {name: int(count) for name, count in zip(self.instances, counts, strict=True) if count}
-
-
-def _receptacle_geoms(scene: Scene, key: str) -> NDArray[np.intp]:
-    """Return the ids of a receptacle's geoms. Geoms merged into the house are recognized by their poses."""
-    model = scene.model
-    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, f"{key}/receptacle")
-    if body >= 0:
-        return np.flatnonzero(_descends(model, body)[model.geom_bodyid])
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    alone = mujoco.MjModel.from_xml_path(str(scene.catalogue.receptacles[key].path))
-    posed = mujoco.MjData(alone)
-    mujoco.mj_kinematics(alone, posed)
-    mount = data.site(f"mount:{key}")
-    expected = posed.geom_xpos @ mount.xmat.reshape(3, 3).T + mount.xpos
-    static = np.flatnonzero(model.geom_bodyid == 0)
-    apart = np.linalg.norm(data.geom_xpos[static, None] - expected[None], axis=2)
-    alike = (model.geom_type[static, None] == alone.geom_type[None]) & np.isclose(
-        model.geom_rbound[static, None], alone.geom_rbound[None], atol=_SAME
-    )
-    same = alike & (apart < _SAME)
-    if not same.any(axis=0).all():
-        raise RenderError(
-            f"the scene's model lacks {int((~same.any(axis=0)).sum())} geoms of receptacle {key!r}; compose the scene "
-            "from the catalogue that it carries"
-        )
-    return np.asarray(static[same.any(axis=1)])
-
-
-def _descends(model: Any, root: int) -> NDArray[np.bool_]:
-    inside = np.zeros(model.nbody, dtype=bool)
-    inside[root] = True
-    for body in range(root + 1, model.nbody):  # in MuJoCo, a parent body precedes its children
-        inside[body] = inside[model.body_parentid[body]]
-    return inside
