@@ -1,6 +1,13 @@
 """Parameters of a person's motions. They are named tuples, because compiled kernels accept named tuples."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple, get_type_hints
+
+
+class Range(NamedTuple):
+    """The valid range of a parameter. With values in these ranges, every pick or place ends within 30 s."""
+
+    low: float
+    high: float
 
 
 class MotionParameters(NamedTuple):
@@ -34,29 +41,29 @@ class MotionParameters(NamedTuple):
     """
 
     turn_gain: float = 6.0
-    turn_timeout: float = 3.0
+    turn_timeout: Annotated[float, Range(0.04, 4.0)] = 3.0
     object_tolerance: float = 0.35
     receptacle_tolerance: float = 0.04
     standing_speed: float = 0.1
     standing_turn_rate: float = 0.5
-    look_gain: float = 0.25
+    look_gain: Annotated[float, Range(0.01, 1.0)] = 0.25
     look_speed: float = 2.0
-    reach_time: float = 0.44
-    align_time: float = 0.12
-    lift_time: float = 0.64
-    lead: float = 0.2
-    start_time: float = 0.12
+    reach_time: Annotated[float, Range(0.1, 3.0)] = 0.44
+    align_time: Annotated[float, Range(0.0, 2.0)] = 0.12
+    lift_time: Annotated[float, Range(0.1, 3.0)] = 0.64
+    lead: Annotated[float, Range(0.0, 0.9)] = 0.2
+    start_time: Annotated[float, Range(0.0, 1.0)] = 0.12
     least_travel: float = 0.005
-    travel_speed: float = 0.9
-    descent_speed: float = 0.65
-    hover_gap: float = 0.03
-    hover_time: float = 0.08
-    release_gap: float = 0.002
-    withdraw_steps: int = 4
-    withdraw_step: float = 0.035
-    posture_gain: float = 7.0
-    posture_speed: float = 1.5
-    posture_acceleration: float = 8.0
+    travel_speed: Annotated[float, Range(0.25, 5.0)] = 0.9
+    descent_speed: Annotated[float, Range(0.25, 5.0)] = 0.65
+    hover_gap: Annotated[float, Range(0.0, 0.3)] = 0.03
+    hover_time: Annotated[float, Range(0.0, 2.0)] = 0.08
+    release_gap: Annotated[float, Range(0.0, 0.1)] = 0.002
+    withdraw_steps: Annotated[int, Range(1, 20)] = 4
+    withdraw_step: Annotated[float, Range(0.001, 0.1)] = 0.035
+    posture_gain: Annotated[float, Range(1.0, 50.0)] = 7.0
+    posture_speed: Annotated[float, Range(0.2, 10.0)] = 1.5
+    posture_acceleration: Annotated[float, Range(1.0, 100.0)] = 8.0
 
 
 class CarryingParameters(NamedTuple):
@@ -75,16 +82,16 @@ class CarryingParameters(NamedTuple):
         most_compliance: Maximum displacement of a yielding hand, in metres.
     """
 
-    least_height: float = 0.97
-    margin: float = 0.03
-    near: float = 0.15
-    far: float = 0.3
-    most_shift: float = 0.2
-    stacking_gap: float = 0.04
-    stacking_distance: float = 0.10
-    push_back: float = 0.25
-    return_rate: float = 0.9
-    most_compliance: float = 0.15
+    least_height: Annotated[float, Range(0.5, 1.3)] = 0.97
+    margin: Annotated[float, Range(0.0, 0.2)] = 0.03
+    near: Annotated[float, Range(0.0, 1.0)] = 0.15
+    far: Annotated[float, Range(0.0, 1.0)] = 0.3
+    most_shift: Annotated[float, Range(0.0, 0.3)] = 0.2
+    stacking_gap: Annotated[float, Range(0.0, 0.2)] = 0.04
+    stacking_distance: Annotated[float, Range(0.01, 0.5)] = 0.10
+    push_back: Annotated[float, Range(0.01, 1.0)] = 0.25
+    return_rate: Annotated[float, Range(0.0, 20.0)] = 0.9
+    most_compliance: Annotated[float, Range(0.0, 0.3)] = 0.15
 
 
 class WalkingParameters(NamedTuple):
@@ -105,15 +112,15 @@ class WalkingParameters(NamedTuple):
             Otherwise, it counts as blocked.
     """
 
-    look_ahead: float = 0.25
-    look_beyond: float = 1.2
-    sidestep_range: float = 0.8
-    object_clearance: float = 0.20
-    sidestep_room: float = 0.6
-    braking_share: float = 0.5
-    turn_gain: float = 5.0
-    facing_tolerance: float = 0.25
-    least_progress: float = 0.05
+    look_ahead: Annotated[float, Range(0.05, 1.0)] = 0.25
+    look_beyond: Annotated[float, Range(0.3, 5.0)] = 1.2
+    sidestep_range: Annotated[float, Range(0.1, 3.0)] = 0.8
+    object_clearance: Annotated[float, Range(0.05, 0.4)] = 0.20
+    sidestep_room: Annotated[float, Range(0.0, 5.0)] = 0.6
+    braking_share: Annotated[float, Range(0.1, 1.0)] = 0.5
+    turn_gain: Annotated[float, Range(0.5, 20.0)] = 5.0
+    facing_tolerance: Annotated[float, Range(0.02, 1.0)] = 0.25
+    least_progress: Annotated[float, Range(0.005, 0.5)] = 0.05
 
 
 # Types of the parameter groups, by their field names in `PersonParameters`.
@@ -123,42 +130,10 @@ GROUPS: dict[str, type[MotionParameters] | type[CarryingParameters] | type[Walki
     "walking": WalkingParameters,
 }
 
-# Valid ranges of parameters. With values in these ranges, every pick or place ends within 30 s.
-GROUP_RANGES: dict[str, tuple[float, float]] = {
-    "motion.turn_timeout": (0.04, 4.0),
-    "motion.look_gain": (0.01, 1.0),
-    "motion.reach_time": (0.1, 3.0),
-    "motion.align_time": (0.0, 2.0),
-    "motion.lift_time": (0.1, 3.0),
-    "motion.lead": (0.0, 0.9),
-    "motion.start_time": (0.0, 1.0),
-    "motion.travel_speed": (0.25, 5.0),
-    "motion.descent_speed": (0.25, 5.0),
-    "motion.hover_gap": (0.0, 0.3),
-    "motion.hover_time": (0.0, 2.0),
-    "motion.release_gap": (0.0, 0.1),
-    "motion.withdraw_steps": (1, 20),
-    "motion.withdraw_step": (0.001, 0.1),
-    "motion.posture_gain": (1.0, 50.0),
-    "motion.posture_speed": (0.2, 10.0),
-    "motion.posture_acceleration": (1.0, 100.0),
-    "carrying.least_height": (0.5, 1.3),
-    "carrying.margin": (0.0, 0.2),
-    "carrying.near": (0.0, 1.0),
-    "carrying.far": (0.0, 1.0),
-    "carrying.most_shift": (0.0, 0.3),
-    "carrying.stacking_gap": (0.0, 0.2),
-    "carrying.stacking_distance": (0.01, 0.5),
-    "carrying.push_back": (0.01, 1.0),
-    "carrying.return_rate": (0.0, 20.0),
-    "carrying.most_compliance": (0.0, 0.3),
-    "walking.look_ahead": (0.05, 1.0),
-    "walking.look_beyond": (0.3, 5.0),
-    "walking.sidestep_range": (0.1, 3.0),
-    "walking.object_clearance": (0.05, 0.4),
-    "walking.sidestep_room": (0.0, 5.0),
-    "walking.braking_share": (0.1, 1.0),
-    "walking.turn_gain": (0.5, 20.0),
-    "walking.facing_tolerance": (0.02, 1.0),
-    "walking.least_progress": (0.005, 0.5),
+# Valid ranges that differ from the default of 1e-4 to 10, by group and name, such as `motion.lead`.
+GROUP_RANGES: dict[str, Range] = {
+    f"{group}.{name}": hint.__metadata__[0]
+    for group, kind in GROUPS.items()
+    for name, hint in get_type_hints(kind, include_extras=True).items()
+    if hasattr(hint, "__metadata__")
 }
