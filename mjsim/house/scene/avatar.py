@@ -36,6 +36,7 @@ EYE = "avatar/eye"
 TRUNK = "avatar/trunk"
 FOOT = "avatar/foot"
 HANDS = ("left", "right")
+LEFT, RIGHT = 0, 1  # indices into `HANDS`
 GRIPS = (0, 1)
 GENTLE, FIRM = "gentle", "firm"  # types of weld constraints between a hand and an object
 SIDES = 64  # number of sides of the prisms that represent the trunk and the foot

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from mjsim.house.compiled.footprint import ClearanceField
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.scene import avatar
+from mjsim.house.scene.avatar import LEFT, RIGHT
 from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel
-from mjsim.values.inventory import LEFT, RIGHT
 from mjsim.values.motion_parameters import CarryingParameters
 from mjsim.world.body.grips import site_gap
 from mjsim.world.body.load_room import BodyMotion, drawn_in

@@ -9,23 +9,20 @@ import numpy as np
 from mjsim.house.compiled.rays import receptacle_in_sight, sees
 from mjsim.house.scene import avatar
 from mjsim.values.actions import ActionResult, Pick, Place, Refusal
-from mjsim.values.inventory import Inventory
 from mjsim.values.observation import ObjectStatus
 from mjsim.world.body.person import Person
 
 _CHEST = 0.75  # height of the chest as a fraction of the eye height
 
 
-def resolve_pick(
-    person: Person, action: Pick, inventory: Inventory, status: Sequence[ObjectStatus], *, busy: bool
-) -> ActionResult:
+def resolve_pick(person: Person, action: Pick, status: Sequence[ObjectStatus], *, busy: bool) -> ActionResult:
     names = person.scene.index.names
     if busy:
         return ActionResult(action, Refusal.BUSY, action.object)
     if action.object is not None and action.object not in names:
         return ActionResult(action, Refusal.UNKNOWN_OBJECT, action.object)
     if action.object is None:
-        return _pick_nearest(person, action, inventory, status)
+        return _pick_nearest(person, action, status)
     item = names.index(action.object)
     target = person.scene.episode.targets[action.object]
     answer = ActionResult(action, None, action.object, target)
@@ -33,17 +30,15 @@ def resolve_pick(
         return replace(answer, refusal=Refusal.ALREADY_CARRIED)
     if status[item] is ObjectStatus.DELIVERED:
         return replace(answer, refusal=Refusal.ALREADY_DELIVERED)
-    if not inventory.free_hands:
+    if not person.free_hands:
         return replace(answer, refusal=Refusal.HANDS_FULL)
     if _object_distances(person, [item])[0] > person.parameters.reach or not _object_in_sight(person, item):
         return replace(answer, refusal=Refusal.OUT_OF_REACH)
     return answer
 
 
-def _pick_nearest(
-    person: Person, action: Pick, inventory: Inventory, status: Sequence[ObjectStatus]
-) -> ActionResult:
-    if not inventory.free_hands:
+def _pick_nearest(person: Person, action: Pick, status: Sequence[ObjectStatus]) -> ActionResult:
+    if not person.free_hands:
         return ActionResult(action, Refusal.HANDS_FULL)
     loose = [i for i, s in enumerate(status) if s is ObjectStatus.LOOSE]
     distances = _object_distances(person, loose)
@@ -56,17 +51,17 @@ def _pick_nearest(
     return ActionResult(action, Refusal.NOTHING_IN_REACH)
 
 
-def resolve_place(person: Person, action: Place, inventory: Inventory, *, busy: bool) -> ActionResult:
+def resolve_place(person: Person, action: Place, *, busy: bool) -> ActionResult:
     scene = person.scene
     if busy:
         return ActionResult(action, Refusal.BUSY, action.object)
     if action.object is not None and action.object not in scene.index.names:
         return ActionResult(action, Refusal.UNKNOWN_OBJECT, action.object)
-    if not inventory.carried:
+    if not person.carried:
         return ActionResult(action, Refusal.HANDS_EMPTY, action.object)
-    if action.object is not None and action.object not in inventory.carried:
+    if action.object is not None and action.object not in person.carried:
         return ActionResult(action, Refusal.NOT_CARRIED, action.object)
-    choices = inventory.carried if action.object is None else (action.object,)
+    choices = person.carried if action.object is None else (action.object,)
     targets = scene.episode.targets
     reachable = reachable_receptacles(person)
     name = min(choices, key=lambda n: (targets[n] not in reachable, _distance(person, targets[n])))

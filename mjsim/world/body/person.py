@@ -73,6 +73,17 @@ class Person:
     def dt(self) -> float:
         return self.options.control_timestep
 
+    @property
+    def carried(self) -> tuple[str, ...]:
+        """The instance names of the held objects, from the left to the right hand."""
+        return tuple(self.scene.index.names[item] for item in self.held if item is not None)
+
+    @property
+    def free_hands(self) -> tuple[int, ...]:
+        """The indices of the free hands. A person with a capacity of 1 uses only the right hand."""
+        usable = (avatar.LEFT, avatar.RIGHT) if self.options.capacity > 1 else (avatar.RIGHT,)
+        return tuple(hand for hand in usable if self.held[hand] is None)
+
     def advance(self) -> None:
         """Simulate one control step, with shorter physics steps while an object falls."""
         self.rig.advance(FALL_DIVISION if self.fall_detector.detects(self.grips.gripped) else 1)

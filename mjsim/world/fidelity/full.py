@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.scene import avatar
+from mjsim.house.scene.avatar import LEFT, RIGHT
 from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import c_function
 from mjsim.values.actions import IDLE, ActionResult, Move, Pick, Place, StepAction
 from mjsim.values.errors import ActionError, StateError
-from mjsim.values.inventory import LEFT, RIGHT
 from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.values.options import WorldOptions
 from mjsim.world.body.carrying import Carrying
@@ -67,7 +67,7 @@ class Full(Tier):
         stop_engine_clock()
         self.scene = scene
         self.data = mujoco.MjData(scene.model)
-        self.episode_state = EpisodeState(scene, options.capacity)
+        self.episode_state = EpisodeState(scene)
         rig = Rig(scene, self.data, options.control_timestep)
         grips = Grips(scene, self.data, rig)
         self.person = Person(scene, options, self.data, rig, grips, held=self.episode_state.held)
@@ -129,11 +129,9 @@ class Full(Tier):
         if isinstance(action, Move):
             return None
         if isinstance(action, Pick):
-            return resolve_pick(
-                self.person, action, self.episode_state.inventory, self.episode_state.status, busy=busy
-            )
+            return resolve_pick(self.person, action, self.episode_state.status, busy=busy)
         if isinstance(action, Place):
-            return resolve_place(self.person, action, self.episode_state.inventory, busy=busy)
+            return resolve_place(self.person, action, busy=busy)
         raise ActionError(f"expected a Move, Pick or Place, got {action!r}")
 
     def hand_for(self, result: ActionResult) -> tuple[int, int]:
@@ -141,7 +139,7 @@ class Full(Tier):
         item = self.scene.index.position_of(str(result.object))
         if isinstance(result.action, Place):
             return self.episode_state.held.index(item), item
-        free = self.episode_state.inventory.free_hands
+        free = self.person.free_hands
         if len(free) == 1:
             return free[0], item
         return LEFT if self.person.rig.to_body(self.person.center(item))[1] > 0.0 else RIGHT, item

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from mjsim.house.compiled.footprint import Floor
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.scene import avatar
+from mjsim.house.scene.avatar import LEFT
 from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import specialized
 from mjsim.values.errors import StateError
-from mjsim.values.inventory import LEFT
 from mjsim.values.observation import StepStates
 from mjsim.values.options import WorldOptions
 from mjsim.world.body.grips import AWAKE

@@ -11,7 +11,6 @@ from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene
 from mjsim.values.actions import IDLE, ActionResult, EventKind, Move, Pick, Place, StepAction, WorldEvent
 from mjsim.values.errors import PhysicsError, StateError
-from mjsim.values.inventory import Inventory
 from mjsim.values.observation import ObjectStatus, Observation, Steps, StepStates
 from mjsim.world.health.monitor import HealthSample, HealthState
 from mjsim.world.state import PersonState, StateDetails
@@ -31,15 +30,14 @@ Floats = NDArray[np.float64]
 class EpisodeState:
     """The contents of the hands, the status of each object, and the events of the current control step."""
 
-    def __init__(self, scene: Scene, capacity: int) -> None:
-        self._capacity = capacity
+    def __init__(self, scene: Scene) -> None:
         self._index, self._targets = scene.index, scene.episode.targets
         self._eye_height = scene.person.eye_height
-        self.held: list[int | None] = [None, None]
+        self.held: list[int | None] = [None, None]  # index of the object in each hand, or None
         self.reset()
 
     def reset(self) -> None:
-        self._set(Inventory(capacity=self._capacity))
+        self.held[:] = None, None
         self.status = [ObjectStatus.LOOSE] * len(self._index.names)
         self.events: list[WorldEvent] = []
 
@@ -48,7 +46,7 @@ class EpisodeState:
 
     def picked(self, time: float, hand: int, item: int, success: bool) -> None:
         if success:
-            self._set(self.inventory.take(hand, self._index.names[item]))
+            self.held[hand] = item
             self.status[item] = ObjectStatus.CARRIED
         self.report(time, EventKind.PICKED if success else EventKind.PICK_FAILED, item)
 
@@ -86,36 +84,34 @@ class EpisodeState:
             object_positions=objects[0],
             object_quaternions=objects[1],
             object_status=tuple(self.status),
-            hands=self.inventory.hands,
+            hands=self._hands,
             busy=busy,
         )
 
     def details(self, health: HealthState, person: PersonState | None = None) -> StateDetails:
-        return StateDetails(self.inventory.hands, tuple(self.status), health, person)
+        return StateDetails(self._hands, tuple(self.status), health, person)
 
     def restore(self, details: StateDetails) -> None:
         """Set the hands and statuses to those of a state. Raise a StateError if its objects differ."""
-        if len(details.status) != len(self._index.names) or not {*details.hands} <= {
-            None,
-            *self._index.names,
-        }:
+        names = self._index.names
+        carried = [name for name in details.hands if name is not None]
+        if len(details.status) != len(names) or len(carried) != len(set(carried) & set(names)):
             raise StateError(
                 f"a state of {len(details.status)} objects with {details.hands} in the hands does not fit a world of "
-                f"{len(self._index.names)} objects; take it from a world of the same episode"
+                f"{len(names)} objects; take it from a world of the same episode"
             )
-        self._set(Inventory(*details.hands, self._capacity))
+        self.held[:] = [None if name is None else names.index(name) for name in details.hands]
         self.status = list(details.status)
         self.events = []
 
     def _release(self, item: int) -> None:
-        name = self._index.names[item]
-        if name in self.inventory.carried:
-            self._set(self.inventory.release(name))
+        if item in self.held:
+            self.held[self.held.index(item)] = None
 
-    def _set(self, inventory: Inventory) -> None:
-        self.inventory = inventory
-        position = self._index.position_of
-        self.held[:] = [None if name is None else position(name) for name in inventory.hands]
+    @property
+    def _hands(self) -> tuple[str | None, str | None]:
+        left, right = (None if item is None else self._index.names[item] for item in self.held)
+        return left, right
 
 
 class Tier(ABC):
