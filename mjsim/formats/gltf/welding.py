@@ -18,8 +18,6 @@ from mjsim.formats.gltf.surfaces import GeomSurface
 UNIT = 1e-4  # distance below which two coordinates count as equal, in metres
 _SIDES, _CORNERS = 6, 4  # number of sides of a box, and of corners of a side
 _ONES = np.eye(_CORNERS)
-_SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])  # corners of a side in its own frame
-_FLAT = 1e-9  # area of a polygon in this frame that counts as zero
 _Line = tuple[int, int, int]  # axis of a line, and its other two coordinates in units
 
 
@@ -58,7 +56,7 @@ def _welded_box(surface: GeomSurface, lines: dict[_Line, NDArray[np.int64]]) -> 
         faces = surface.triangles[2 * side : 2 * side + 2] - rows[0]
         if len(around) > _CORNERS:
             is_turned = faces[0].tolist() != [0, 1, 2]
-            faces = np.array(_triangulated(around @ _SQUARE))[:, :: -1 if is_turned else 1]
+            faces = _triangles(int(around[:, 2].argmax()), len(around) - 1)[:, :: -1 if is_turned else 1]
         weights.append((rows, around))
         triangles.append(faces + count)
         count += len(around)
@@ -87,25 +85,13 @@ def _outline(side: NDArray[np.int64], lines: dict[_Line, NDArray[np.int64]]) -> 
             yield (1.0 - share) * _ONES[start] + share * _ONES[end]
 
 
-def _triangulated(points: Floats) -> list[list[int]]:
-    """Divide a convex polygon (n, 2) into triangles, none of which is flat. Its vertices may be in line."""
+def _triangles(third: int, last: int) -> NDArray[np.int64]:
+    """Divide a side into two fans of triangles. `third` and `last` are the third corner and the last vertex.
 
-    places = points.tolist()
-
-    def area(ring: Sequence[int]) -> float:
-        corners = [places[vertex] for vertex in ring]
-        ways = zip(corners, [*corners[1:], corners[0]], strict=True)
-        return float(sum(x0 * y1 - y0 * x1 for (x0, y0), (x1, y1) in ways))
-
-    triangles, ring = [], list(range(len(points)))
-    while len(ring) > 3:
-        for at in range(len(ring)):
-            ear, rest = [ring[at - 1], ring[at], ring[(at + 1) % len(ring)]], ring[:at] + ring[at + 1 :]
-            if area(ear) > _FLAT and area(rest) > _FLAT:
-                break
-        triangles.append(ear)
-        ring = rest
-    return [*triangles, ring]
+    No triangle is flat, because the tip of each fan is on one edge and its other vertices are on the next two.
+    """
+    fans = [(last, k, k + 1) for k in range(third - 1)], [(third - 1, k, k + 1) for k in range(third, last)]
+    return np.array([*fans[0], *fans[1]])
 
 
 def _mixed(values: Floats, weights: Sequence[tuple[NDArray[np.int64], Floats]]) -> Floats:
