@@ -143,7 +143,7 @@ def _today() -> int:
 
 
 def remove_leftovers(folder: Path, max_age: float = MAX_AGE, prefix: str = WORK) -> None:
-    """Remove temporary files and folders that have not changed for at least `max_age` seconds."""
+    """Remove files and folders whose names begin with `prefix` if they have not changed for `max_age` seconds."""
     with os.scandir(folder) as entries:
         paths = [Path(entry) for entry in entries if entry.name.startswith(prefix)]
     for path in paths:

@@ -6,15 +6,13 @@ numba is imported when the first kernel is declared.
 import functools
 import os
 import re
-import shutil
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from platformdirs import user_cache_path
 
-from mjsim.support.files import ROOT, digest_of
+from mjsim.support.files import ROOT, digest_of, remove_leftovers
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -96,8 +94,9 @@ def cache_folder(source: Path) -> Path | None:
     try:
         folder = base / f"mjsim-{source.stem}-{digest_of(*sorted(_compiled_in(source) | {Path(__file__)}))}"
         if not folder.is_dir():
-            _delete_unused(base)
-            folder.mkdir(parents=True, exist_ok=True)
+            base.mkdir(parents=True, exist_ok=True)
+            remove_leftovers(base, UNUSED, "mjsim-")
+            folder.mkdir(exist_ok=True)
         os.utime(folder)  # marks the folder as used, and fails if it is not writable
     except OSError:
         return None
@@ -121,9 +120,3 @@ def _compiled_in(source: Path) -> set[Path]:
 @functools.cache
 def _has_kernels(path: Path) -> bool:
     return path.is_file() and MARK in path.read_bytes()
-
-
-def _delete_unused(base: Path) -> None:
-    for folder in base.glob("mjsim-*"):
-        if time.time() - folder.stat().st_mtime > UNUSED:
-            shutil.rmtree(folder, ignore_errors=True)

@@ -4,8 +4,6 @@ import fcntl
 import gzip
 import hashlib
 import os
-import shutil
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,7 +14,7 @@ import mujoco
 from mjsim.formats.gltf.export import export_scene, floor_json
 from mjsim.formats.gltf.store import GZIP
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.support.files import WORK, replacing, source_digest, work_folder
+from mjsim.support.files import remove_leftovers, replacing, source_digest, work_folder
 from mjsim.support.kernels import UNUSED
 
 _LEVEL = 9
@@ -44,7 +42,7 @@ def cached_scene(catalogue: Catalogue, folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         with _locked(folder):
             if not target.is_dir():
-                _delete_unused(folder)
+                remove_leftovers(folder, UNUSED, "")
                 _make(catalogue, folder, target)
     os.utime(target)  # marks the folder as recently used
     return target
@@ -94,9 +92,3 @@ def _locked(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
-
-
-def _delete_unused(folder: Path) -> None:
-    for scene in folder.iterdir():
-        if not scene.name.startswith(WORK) and time.time() - scene.stat().st_mtime > UNUSED:
-            shutil.rmtree(scene, ignore_errors=True)

@@ -76,8 +76,8 @@ def test_an_unrelated_edit_recompiles_nothing_and_unused_machine_code_goes(tmp_p
     old = set(cache.iterdir())
     (cache / "of-somebody-else").mkdir()
     long_ago = time.time() - kernels.UNUSED - 1
-    for folder in cache.iterdir():
-        os.utime(folder, (long_ago, long_ago))
+    for path in cache.rglob("*"):
+        os.utime(path, (long_ago, long_ago))
     _set(tmp_path, factor=3, offset=0)
     _run(tmp_path, cache)
     new = set(cache.iterdir())
