@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from trimesh.visual.color import linear_to_srgb
 
 from mjsim.formats.scene.surface import Floats, Surface
 
@@ -42,7 +43,7 @@ def surface_of(mesh: trimesh.Trimesh, *, linear: bool, side: int | None = None) 
     elif visual.kind == "face":
         colours = np.repeat(np.asarray(visual.face_colors, np.float64)[:, None, :3] / 255, 3, axis=1)
     if linear and visual.kind is not None:
-        colours = _srgb(colours)
+        colours = linear_to_srgb(np.clip(colours, 0.0, 1.0))
     uv = np.nan_to_num(uv, nan=0.0, posinf=0.0, neginf=0.0)
     number = np.full(count, -1 if picture is None else 0)
     return Surface(corners, colours, uv, number, () if picture is None else (picture,))
@@ -86,9 +87,3 @@ def _unit(values: NDArray[Any]) -> Floats:
     """Convert normalized integers to numbers from 0 to 1."""
     whole = np.iinfo(values.dtype).max if np.issubdtype(values.dtype, np.integer) else 1
     return np.clip(np.nan_to_num(values.astype(np.float64) / whole), 0.0, 1.0)
-
-
-def _srgb(linear: Floats) -> Floats:
-    """Convert linear colours to sRGB (IEC 61966-2-1)."""
-    low, high = 12.92 * linear, 1.055 * np.clip(linear, 0.0, 1.0) ** (1 / 2.4) - 0.055
-    return np.where(linear <= 0.0031308, low, high)

@@ -6,6 +6,7 @@ from typing import Any, Self
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
 from mjsim.values.errors import AssetError
 
@@ -101,10 +102,6 @@ def _welded(corners: Floats) -> tuple[Floats, Ints]:
 
 def _sample(image: Floats, places: Floats) -> Floats:
     height, width = image.shape[:2]
-    x, y = places[:, 0] * width - 0.5, (1.0 - places[:, 1]) * height - 0.5
-    left, top = np.floor(x).astype(int), np.floor(y).astype(int)
-    across, down = (x - left)[:, None], (y - top)[:, None]
-    columns, rows = (left % width, (left + 1) % width), (top % height, (top + 1) % height)
-    upper = image[rows[0], columns[0]] * (1 - across) + image[rows[0], columns[1]] * across
-    lower = image[rows[1], columns[0]] * (1 - across) + image[rows[1], columns[1]] * across
-    return np.asarray(upper * (1 - down) + lower * down)
+    pixels = (1.0 - places[:, 1]) * height - 0.5, places[:, 0] * width - 0.5
+    channels = [map_coordinates(image[..., k], pixels, order=1, mode="grid-wrap") for k in range(3)]
+    return np.stack(channels, axis=-1)
