@@ -66,7 +66,7 @@ class BoxOccluders:
         ahead = np.einsum("ij,ij->i", normal, centre)
         # Closer boxes are not used, because the near plane could cut them open.
         clear = 1.5 * view.near * np.sqrt(1.0 + view.half_height**2 * (1.0 + aspect**2))
-        usable = (np.abs(ahead) - size[rows, self._thin] > clear) & _opaque(self._model, ids)
+        usable = (np.abs(ahead) - size[rows, self._thin] > clear) & ~translucent_geoms(self._model)[ids]
         distance = np.maximum(np.linalg.norm(centre, axis=1), 1e-6)
         looks = size[rows, one] * size[rows, two] * np.abs(ahead) / distance**3
         chosen = np.argsort(-np.where(usable, looks, 0.0), kind="stable")[:_TESTED]
@@ -138,12 +138,12 @@ def _extent(
     return middle, reach
 
 
-def _opaque(model: Any, ids: NDArray[np.int_]) -> NDArray[np.bool_]:
-    own = model.geom_rgba[ids, 3] >= 1.0
-    material = model.geom_matid[ids]
-    if not model.nmat:
-        return np.asarray(own)
-    return np.asarray(own & ((material < 0) | (model.mat_rgba[material, 3] >= 1.0)))
+def translucent_geoms(model: Any) -> NDArray[np.bool_]:
+    """Return a mask (ngeom,) of the geoms that are translucent because of their own colour or their material."""
+    translucent = model.geom_rgba[:, 3] < 1.0
+    if model.nmat:
+        translucent |= (model.geom_matid >= 0) & (model.mat_rgba[model.geom_matid, 3] < 1.0)
+    return np.asarray(translucent)
 
 
 def _see_through_texture(model: Any) -> NDArray[np.bool_]:

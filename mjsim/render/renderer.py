@@ -11,6 +11,7 @@ from mjsim.house.scene.avatar import EYE
 from mjsim.render import context
 from mjsim.render.cameras import CameraPose, ViewVolume, camera_pose
 from mjsim.render.markers import MarkerLike, blend_hidden
+from mjsim.render.occlusion import translucent_geoms
 from mjsim.render.profiles import RenderProfile, resolve_profile
 from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, Layer, Rasteriser, reduced
 
@@ -184,7 +185,7 @@ class LayeredRenderer(OffScreenRenderer):
         profile = self._profile
         self._layered = not (profile.shadow_size or profile.reflections or profile.samples)
         self._camera: CameraPose | None = None
-        self._translucent = _translucent(model)
+        self._translucent = translucent_geoms(model)
         self._still = np.full(model.ngeom, REST)  # number of frames since each geom last moved
         self._poses = np.full((model.ngeom, 12), np.nan)
         self._moving: NDArray[np.bool_] | None = None
@@ -248,11 +249,3 @@ class _Solid:
         self.shape, self.position, self.size = marker.shape, marker.position, marker.size
         self.rgba = (*marker.rgba[:3], 1.0)
         self.x_ray = marker.x_ray
-
-
-def _translucent(model: Any) -> NDArray[np.bool_]:
-    material = model.geom_matid
-    opacity = (
-        np.where(material >= 0, model.mat_rgba[material, 3], 1.0) if model.nmat else np.ones(model.ngeom)
-    )
-    return np.asarray((model.geom_rgba[:, 3] < 1.0) | (opacity < 1.0))
