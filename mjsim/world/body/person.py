@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene
 from mjsim.house.sight.receptacle_heights import ReceptacleHeights
-from mjsim.support.kernels import kernel
 from mjsim.values.actions import Move
 from mjsim.values.motion_parameters import MotionParameters
 from mjsim.values.options import WorldOptions
@@ -50,16 +49,7 @@ class Person:
     def __post_init__(self) -> None:
         self.receptacle_heights = ReceptacleHeights(self.scene)
         self.fall_detector = FallDetector(self.scene.model, self.data, self.scene.index)
-        p = self.parameters
-        limits = (
-            p.fastest_walk,
-            p.walking_acceleration,
-            p.turning_speed,
-            p.turning_acceleration,
-            p.looking_speed,
-        )
-        self._limits = np.array([*limits, *avatar.PITCH_RANGE, self.dt])
-        self.posture_pace = posture_pace(p.motion)
+        self.posture_pace = posture_pace(self.motion)
 
     @property
     def parameters(self) -> PersonParameters:
@@ -124,8 +114,11 @@ class Person:
 
     def walk(self, move: Move) -> None:
         """Change the commanded velocities and head pitch towards a move, within the person's limits."""
+        command, person, dt = self.rig.motion, self.parameters, self.dt
         forward, left, turn, look = float(move.forward), float(move.left), float(move.turn), float(move.look)
-        change_command(self.rig.motion, forward, left, turn, look, self._limits)
+        change_velocity(command, forward, left, person.fastest_walk, person.walking_acceleration * dt)
+        change_turn_rate(command, turn, person.turning_speed, person.turning_acceleration * dt)
+        change_pitch(command, look, person.looking_speed, *avatar.PITCH_RANGE, dt)
 
     def brake(self) -> None:
         """Reduce the walking speed for one control step. Turns and head movements are not affected."""
@@ -183,26 +176,6 @@ class Person:
 def wrap(angle: float) -> float:
     """Wrap an angle in radians to [-pi, pi)."""
     return (angle + math.pi) % (2 * math.pi) - math.pi
-
-
-@kernel
-def change_command(
-    command: NDArray[np.float64],
-    forward: float,
-    left: float,
-    turn: float,
-    look: float,
-    limits: NDArray[np.float64],
-) -> None:
-    """Change a command (forward, left, yaw rate, pitch) towards a move for one control step.
-
-    `limits` (8,) contains the maximum walking speed, acceleration, yaw rate, angular acceleration and pitch
-    rate, the lowest and highest pitch, and the duration of a control step, in SI units.
-    """
-    max_speed, acceleration, max_turn, turn_acceleration, max_look, lowest, highest, dt = limits
-    change_velocity(command, forward, left, max_speed, acceleration * dt)
-    change_turn_rate(command, turn, max_turn, turn_acceleration * dt)
-    change_pitch(command, look, max_look, lowest, highest, dt)
 
 
 def _clip(value: float, limit: float) -> float:
