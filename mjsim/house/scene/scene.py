@@ -40,8 +40,8 @@ class SceneIndex:
     @classmethod
     def from_model(cls, model: mujoco.MjModel, names: tuple[str, ...]) -> "SceneIndex":
         """Create the index of a compiled model. Raise an AssetError if an object is missing."""
-        bodies = np.array([_find(model, mujoco.mjtObj.mjOBJ_BODY, f"{n}/object") for n in names], np.int32)
-        joints = np.array([_find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{n}/free") for n in names], np.int32)
+        bodies = np.array([find_id(model, mujoco.mjtObj.mjOBJ_BODY, f"{n}/object") for n in names], np.int32)
+        joints = np.array([find_id(model, mujoco.mjtObj.mjOBJ_JOINT, f"{n}/free") for n in names], np.int32)
         owner_of_body = np.full(model.nbody, -1, np.int32)
         for position, body in enumerate(bodies):
             owner_of_body[model.body_rootid == body] = position
@@ -194,8 +194,11 @@ def _attach_object(spec: mujoco.MjSpec, model: mujoco.MjSpec, placed: PlacedObje
     body.add_freejoint(name=f"{placed.name}/free")
 
 
-def _find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
-    found = mujoco.mj_name2id(model, kind, name)
+def find_id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
+    """Return the id of a named part of a scene. Raise an AssetError if the model has no such part."""
+    found = int(mujoco.mj_name2id(model, kind, name))
     if found < 0:
-        raise AssetError(f"the compiled model has no {name!r}; compose it from an episode")
-    return int(found)
+        raise AssetError(
+            f"the model has no {kind.name} {name!r}; compose it from an episode, with avatar=True"
+        )
+    return found

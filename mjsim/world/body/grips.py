@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.scene import avatar
-from mjsim.house.scene.scene import Scene
+from mjsim.house.scene.scene import Scene, find_id
 from mjsim.support.kernels import kernel
-from mjsim.world.body.rig import Rig, find_id
+from mjsim.world.body.rig import Rig
 
 AWAKE = -11  # value of `MjData.tree_asleep` that keeps a tree awake for at least ten physics steps
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.scene import avatar
-from mjsim.house.scene.scene import Scene
+from mjsim.house.scene.scene import Scene, find_id
 from mjsim.support.kernels import kernel
 from mjsim.values.errors import AssetError
 
@@ -211,11 +211,3 @@ def _view(values: Vector, addresses: NDArray[np.integer[Any]]) -> Vector:
             "compose the scene with avatar=True"
         )
     return values[first : first + count]
-
-
-def find_id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
-    """Return the id of a named part of the person. Raise an AssetError if the model has no such part."""
-    found = int(mujoco.mj_name2id(model, kind, name))
-    if found < 0:
-        raise AssetError(f"the model has no {kind.name} {name!r}; compose the scene with avatar=True")
-    return found
