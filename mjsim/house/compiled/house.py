@@ -205,7 +205,7 @@ class CompiledHouse:
                 raise AssetError(f"{path} has no site 'mount:{key}'; add one")
             child = read_model(receptacle.path, body="receptacle")
             for number, geom in enumerate(child.geoms):
-                geom.name = geom.name or f"geom_{number}"  # the prefix of the name identifies the receptacle
+                geom.name = geom.name or f"#{number}"  # the prefix of the name identifies the receptacle
             with compile_errors(f"house {path} with the receptacle {receptacle.path}"):
                 spec.attach(child, prefix=f"{key}/", site=mount)
         _set_options(spec)
