@@ -117,12 +117,11 @@ class Builder:
         height: float,
         inset: float = 0.05,
         radius: float = 0.022,
-        x: float = 0.0,
     ) -> None:
         square = self.chance(0.5)
         for sx in (-1, 1):
             for v in (y[0] + inset, y[1] - inset):
-                u = x + sx * (w / 2 - inset)
+                u = sx * (w / 2 - inset)
                 if square:
                     self.box(material, 2 * radius, (v - radius, v + radius), (0, height), u, seen=True)
                 else:

@@ -120,14 +120,13 @@ def visible_shares(
     heading: float,
     pitch: float = 0.0,
     *,
-    field: FieldOfView | None = None,
     among: Collection[str] | None = None,
 ) -> dict[str, float]:
     """Return the visible fraction of each object in view, estimated as the fraction of rays that hit it.
 
     See `visible_objects` for the arguments.
     """
-    gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView.of(scene.person))
+    gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, FieldOfView.of(scene.person))
     hits = list(_object_hits(scene, data, gaze, among, once=False))
     return {scene.index.names[i]: hits.count(i) / len(OFFSETS) for i in sorted(set(hits))}
 

@@ -48,9 +48,9 @@ class _Size:
     middle: tuple[float, float]  # centre of the bin's base
 
 
-def place_bins(grid: FloorGrid, rooms: Rooms, catalogue: Catalogue, seed: int = 0) -> tuple[Bin, ...]:
+def place_bins(grid: FloorGrid, rooms: Rooms, catalogue: Catalogue) -> tuple[Bin, ...]:
     """Place as many bins as the floor area allows. Raise an AssetError if no bin fits."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     wanted = [key for key in _HOMES if key in catalogue.receptacles]
     wanted = wanted[: max(1, int(grid.area / AREA))]
     bins: list[Bin] = []

@@ -45,7 +45,7 @@ def convex_parts(solid: ClosedBody) -> Parts:
         # The mean thickness of thin walls is twice their volume, divided by the area of both sides.
         walls = 2 * solid.mesh.volume / solid.mesh.area < _WALL
         pieces = [] if walls else _decomposed(solid)
-        if walls or min(width(points) for points in pieces) < _WALL:
+        if walls or min(narrowest(points)[1] for points in pieces) < _WALL:
             reason = f"hollow or thin: its convex hull, of which it fills {100 * filled:.0f} %"
         else:
             hulls, reason = pieces, "convex parts by CoACD"
@@ -53,11 +53,6 @@ def convex_parts(solid: ClosedBody) -> Parts:
     thick = [_thickened(points) for points in reduced]
     changed = sum(len(a) != len(b) or not np.array_equal(a, b) for a, b in zip(reduced, thick, strict=True))
     return Parts(tuple(thick), reason, changed)
-
-
-def width(points: Floats) -> float:
-    """Return the width of the convex hull of points (n, 3) in its narrowest direction, in metres."""
-    return _narrowest(points)[1]
 
 
 def _decomposed(solid: ClosedBody) -> list[Floats]:
@@ -120,7 +115,7 @@ def _few_vertices(points: Floats) -> Floats:
 def _thickened(points: Floats) -> Floats:
     """Thicken the hull of points (n, 3) symmetrically until it is at least `MIN_WIDTH` wide."""
     for _ in range(4):
-        direction, across = _narrowest(points)
+        direction, across = narrowest(points)
         if across > MIN_WIDTH - 1e-6:
             break
         step = direction * (MIN_WIDTH - across) / 2
@@ -128,7 +123,7 @@ def _thickened(points: Floats) -> Floats:
     return points
 
 
-def _narrowest(points: Floats) -> tuple[Floats, float]:
+def narrowest(points: Floats) -> tuple[Floats, float]:
     """Return the direction (3,) in which the hull of points (n, 3) is narrowest, and the width there."""
     normals = scipy.spatial.ConvexHull(points).equations[:, :3]
     directions = np.concatenate((np.eye(3), normals))

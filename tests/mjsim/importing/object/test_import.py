@@ -28,7 +28,7 @@ from mjsim.importing.object.closed_body import weigh
 from mjsim.importing.object.house_extension import CatalogueEntry, HouseExtension, held_in
 from mjsim.importing.object.mesh_import import add_mesh
 from mjsim.importing.object.object_import import import_object
-from mjsim.importing.object.parts import MAX_PARTS, MAX_VERTICES, MIN_WIDTH, cuts_itself, width
+from mjsim.importing.object.parts import MAX_PARTS, MAX_VERTICES, MIN_WIDTH, cuts_itself, narrowest
 from mjsim.importing.object.resting import STEADY, resting_pose
 from mjsim.importing.object.visual_mesh import SIDE, Atlas
 from mjsim.support.files import remove_leftovers
@@ -81,7 +81,7 @@ def test_an_imported_object_keeps_the_conventions_of_ours(imported, key):
         mesh = model.geom_dataid[geom]
         first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
         assert count <= MAX_VERTICES + 8
-        assert width(model.mesh_vert[first : first + count].astype(float)) > MIN_WIDTH - 1e-4
+        assert narrowest(model.mesh_vert[first : first + count].astype(float))[1] > MIN_WIDTH - 1e-4
 
 
 @pytest.mark.slow
