@@ -73,6 +73,7 @@ DAMAGES = {
     "another grip": (lambda s: with_details(s, {"grips": ((99, 0), None)}), "details do not fit"),
     "an object less": (lambda s: with_details(s, status=s.details.status[1:]), "same episode"),
     "another object": (lambda s: with_details(s, hands=("nobody's", None)), "same episode"),
+    "one object in both hands": (lambda s: with_details(s, hands=("o0", "o0")), "same episode"),
 }
 
 

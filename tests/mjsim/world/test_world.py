@@ -329,3 +329,12 @@ def test_whatever_is_done_the_books_agree_with_the_physics(small_catalogue, scri
                 grip = world.data.site(f"{name}/grip_0").xpos
                 hand_point = world.data.site(f"avatar/{avatar.HANDS[hand]}_grip").xpos
                 assert np.linalg.norm(grip - hand_point) < 0.01
+
+
+@tiers
+def test_a_person_with_a_capacity_of_one_uses_the_right_hand(small_catalogue, fidelity):
+    scene = scene_of(small_catalogue, (1.0, 1.0, 0.0), ("cube", 1.6, 1.3), ("ball", 1.6, 0.7))
+    world = world_of(scene, fidelity, capacity=1)
+    do(world, Pick("o0"))  # it is to the left of the person
+    assert world.observation().hands == (None, "o0")
+    assert world.answer(Pick("o1")).refusal is Refusal.HANDS_FULL
