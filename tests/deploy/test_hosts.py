@@ -9,6 +9,7 @@ import httpx
 import pytest
 from nginx_site import STUDY, make_certificate, nginx_before
 from scripted_workers import hello
+from store_clock import at
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
@@ -132,7 +133,8 @@ def test_the_visits_of_a_killed_host_go_on_at_the_other(tmp_path, hosts, certifi
                 tmp_path / other / "out" / "visits" / person.name,
             )
     assert first.page().status_code in NOWHERE, "the lost host may still run"
-    moved = asyncio.run(ask(lambda store: store.hand_over(lost, "ada", utc_now() + SILENT)))
+    with at(utc_now() + SILENT):
+        moved = asyncio.run(ask(lambda store: store.hand_over(lost, "ada")))
     assert moved == list(before.values()).count(lost)
     assert first.press(5) == 10, "what was acknowledged is there"
     assert all(person.page().status_code == 200 for person in people)

@@ -34,9 +34,7 @@ class Retained:
     unpaid: tuple[str, ...]
 
 
-async def forget_old(
-    store: Store, visits: Path, keep_days: int, *, dry: bool = False, now: datetime.datetime | None = None
-) -> Retained:
+async def forget_old(store: Store, visits: Path, keep_days: int, *, dry: bool = False) -> Retained:
     """Delete the platform ids, keys and links of participants who have been inactive for `keep_days` days.
 
     Participants who asked for deletion are erased. The measures and answers of all others are kept.
@@ -45,7 +43,7 @@ async def forget_old(
     Args:
         dry: True to report the affected participants without deleting anything.
     """
-    before = (now or utc_now()) - datetime.timedelta(days=keep_days)
+    before = utc_now() - datetime.timedelta(days=keep_days)
     owed = {p.person_id for p in await store.ledger.owed(in_doubt_after=datetime.timedelta())}
     people = [await store.person(number) for number in await store.known(before)]
     paid = [person for person in people if person.id not in owed]

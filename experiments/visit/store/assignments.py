@@ -62,7 +62,6 @@ class Assignments(StorePart):
         cells: Sequence[CellQuota],
         rule: Rule,
         rng: np.random.Generator,
-        now: datetime | None = None,
         abandoned_after: timedelta = timedelta(minutes=30),
     ) -> Assignment | None:
         """Assign a participant to a cell if needed. Return the place, or None if all cells are full.
@@ -80,7 +79,7 @@ class Assignments(StorePart):
         Raises:
             StoreError: The participation has ended.
         """
-        now = now or utc_now()
+        now = utc_now()
         quotas = await lock_study(connection, self._study_id)
         await self._check_active(connection, person_id, now)
         before = await place_of(connection, person_id)

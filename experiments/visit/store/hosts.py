@@ -3,7 +3,7 @@
 Times are measured with the database's clock, because the clocks of the hosts may be wrong.
 """
 
-from datetime import datetime, timedelta
+from datetime import timedelta
 
 from sqlalchemy import delete, exists, insert, or_, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection as Connection
@@ -64,14 +64,12 @@ class Hosts(StorePart):
         await note(connection, self._study_id, who, action, {"host": name}, await database_now(connection))
 
     @transaction
-    async def hand_over(
-        self, connection: Connection, name: str, who: str, now: datetime | None = None
-    ) -> int:
+    async def hand_over(self, connection: Connection, name: str, who: str) -> int:
         """Allow other hosts to take over the visits of a failed host. Return the number of visits.
 
         The other host must have the journal of the visit. Raises StoreError if the host may still be running.
         """
-        at = now or await database_now(connection)
+        at = await database_now(connection)
         mine = (host.c.study_id == self._study_id, host.c.name == name)
         seen = (await connection.execute(select(host.c.seen).where(*mine).with_for_update())).scalar()
         if seen is None:

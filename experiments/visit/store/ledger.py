@@ -36,7 +36,6 @@ class Ledger(StorePart):
         currency: str,
         key: str,
         note: str = "",
-        now: datetime | None = None,
     ) -> bool:
         """Record that a payment is owed. Return False if it is already recorded.
 
@@ -63,13 +62,11 @@ class Ledger(StorePart):
                 f"{first.person_id}, and stays so: use another key for another payment."
             )
         await self._check_person(connection, person_id, kind)
-        await self._add(connection, key, 0, "decided", now, note=note, **values)
+        await self._add(connection, key, 0, "decided", note=note, **values)
         return True
 
     @transaction
-    async def begin_sending(
-        self, connection: Connection, key: str, now: datetime | None = None
-    ) -> int | None:
+    async def begin_sending(self, connection: Connection, key: str) -> int | None:
         """Record a new attempt to send a payment. Return its number, or None if the payment must not be sent now.
 
         It must not be sent if it has been paid or the outcome of another attempt is unknown. Send the request
@@ -80,31 +77,23 @@ class Ledger(StorePart):
         if events[-1].in_doubt or paid(events):
             return None
         attempt = events[-1].attempt + 1
-        await self._add(connection, key, attempt, "sending", now, **_same(events[0]))
+        await self._add(connection, key, attempt, "sending", **_same(events[0]))
         return attempt
 
     @transaction
     async def confirm(
-        self,
-        connection: Connection,
-        key: str,
-        attempt: int,
-        reference: str,
-        note: str = "",
-        now: datetime | None = None,
+        self, connection: Connection, key: str, attempt: int, reference: str, note: str = ""
     ) -> bool:
         """Record that the platform has made a payment. Return False if this has already been recorded."""
         events = await self._known(connection, key)
         if paid(events):
             return False
         values = {**_same(events[0]), "reference": reference, "note": note}
-        await self._add(connection, key, attempt, "confirmed", now, **values)
+        await self._add(connection, key, attempt, "confirmed", **values)
         return True
 
     @transaction
-    async def fail(
-        self, connection: Connection, key: str, attempt: int, note: str, now: datetime | None = None
-    ) -> bool:
+    async def fail(self, connection: Connection, key: str, attempt: int, note: str) -> bool:
         """Record that an attempt has definitely failed. Return False if it is not the current attempt.
 
         Never call this after a timeout or a lost connection, because the platform may have paid.
@@ -112,18 +101,16 @@ class Ledger(StorePart):
         events = await self._known(connection, key)
         if (events[-1].event, events[-1].attempt) != ("sending", attempt):
             return False
-        await self._add(connection, key, attempt, "failed", now, note=note, **_same(events[0]))
+        await self._add(connection, key, attempt, "failed", note=note, **_same(events[0]))
         return True
 
-    async def owed(
-        self, now: datetime | None = None, in_doubt_after: timedelta = IN_DOUBT_AFTER
-    ) -> tuple[PaymentEvent, ...]:
+    async def owed(self, in_doubt_after: timedelta = IN_DOUBT_AFTER) -> tuple[PaymentEvent, ...]:
         """Return the last event of each unconfirmed payment, except for those that are currently being sent.
 
         If the event is `sending`, the payment is in doubt. Ask the platform about the key, and then call
         :meth:`confirm` or :meth:`fail`.
         """
-        limit = (now or await self.now()) - in_doubt_after
+        limit = await self.now() - in_doubt_after
         payments = by_key(await self.history()).values()
         unpaid = [events[-1] for events in payments if not paid(events)]
         return tuple(last for last in unpaid if not last.in_doubt or last.at <= limit)
@@ -161,24 +148,10 @@ class Ledger(StorePart):
             if (before := (await connection.execute(given)).scalar()) is not None:
                 raise StoreError(f"Person {person_id} has payment {before!r}. An addition is a bonus.")
 
-    async def _add(
-        self,
-        connection: Connection,
-        key: str,
-        attempt: int,
-        event: str,
-        now: datetime | None,
-        **values: Any,
-    ) -> None:
-        texts = {"reference": "", "note": ""}
-        row = {
-            "study_id": self._study_id,
-            "key": key,
-            "attempt": attempt,
-            "event": event,
-            "at": now or await database_now(connection),
-        }
-        await connection.execute(insert(payment).values(**texts | row | values))
+    async def _add(self, connection: Connection, key: str, attempt: int, event: str, **values: Any) -> None:
+        row = {"study_id": self._study_id, "key": key, "attempt": attempt, "event": event}
+        row |= {"at": await database_now(connection), "reference": "", "note": ""}
+        await connection.execute(insert(payment).values(**row | values))
 
 
 def _check(kind: str, cents: int, currency: str) -> None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from datetime import datetime
 from typing import Any
 
 from sqlalchemy import ColumnElement, bindparam, delete, insert, select, update
@@ -43,7 +42,6 @@ class People(StorePart):
         identity: Mapping[str, str],
         token_hash: str,
         phase: str,
-        now: datetime | None = None,
     ) -> PersonRow:
         """Return the participant who has opened a link. Add a new participant if necessary.
 
@@ -56,7 +54,7 @@ class People(StorePart):
                 replace earlier ones while the participant is active.
             token_hash: Hexadecimal SHA-256 of the link's token.
         """
-        now = now or utc_now()
+        now = utc_now()
         same = person.c.token_hash == token_hash if key is None else person.c.platform_key == key
         known = (await connection.execute(self._select(same))).first()
         if known is not None:
@@ -125,9 +123,9 @@ class People(StorePart):
         await note(connection, self._study_id, who, "participants reconciled", {"unknown": unknown}, now)
 
     @transaction
-    async def beat(self, connection: Connection, person_id: int, now: datetime | None = None) -> None:
+    async def beat(self, connection: Connection, person_id: int) -> None:
         """Record that a participant is active, so that the participant's place is not given away."""
-        now = now or utc_now()
+        now = utc_now()
         late = person.c.seen < now
         await connection.execute(update(person).where(person.c.id == person_id, late).values(seen=now))
 

@@ -44,16 +44,13 @@ class Phases(StorePart):
     """The part of the store for phases, answers and trials."""
 
     @transaction
-    async def show_phase(
-        self, connection: Connection, person_id: int, name: str, now: datetime | None = None
-    ) -> PhaseRow:
+    async def show_phase(self, connection: Connection, person_id: int, name: str) -> PhaseRow:
         """Record when a phase was first shown to a participant, and return its row."""
-        now = now or utc_now()
         row = await _phase(connection, person_id, name)
         if row is None:
-            new = {"person_id": person_id, "name": name, "shown": now}
+            row = PhaseRow(person_id, name, utc_now(), None, None, None, None)
+            new = {"person_id": person_id, "name": name, "shown": row.shown}
             await connection.execute(insert(phases), new)
-            return PhaseRow(person_id, name, now, None, None, None, None)
         return row
 
     @transaction
@@ -67,7 +64,6 @@ class Phases(StorePart):
         reason: str | None = None,
         *,
         status: Status | None = None,
-        now: datetime | None = None,
     ) -> bool:
         """Advance a participant to the next phase and make the answers final, in one transaction.
 
@@ -78,7 +74,7 @@ class Phases(StorePart):
             reason: Reason why the phase ended, if several are possible.
             status: Final status, such as `finished`, if this phase ends the visit.
         """
-        now = now or utc_now()
+        now = utc_now()
         if status is not None:
             await lock_study(connection, self._study_id)
         moved = await connection.execute(
@@ -94,18 +90,13 @@ class Phases(StorePart):
 
     @transaction
     async def save_answers(
-        self,
-        connection: Connection,
-        person_id: int,
-        phase: str,
-        values: Mapping[str, Any],
-        now: datetime | None = None,
+        self, connection: Connection, person_id: int, phase: str, values: Mapping[str, Any]
     ) -> bool:
         """Save or replace answers of the current phase. Return False if the participant is in another phase.
 
         The answers of a phase cannot be changed after its end.
         """
-        now = now or utc_now()
+        now = utc_now()
         current = await connection.execute(_IN_PHASE, {"person": person_id, "from": phase, "seen": now})
         if not current.rowcount:
             return False
@@ -114,16 +105,10 @@ class Phases(StorePart):
 
     @transaction
     async def finish_trial(
-        self,
-        connection: Connection,
-        person_id: int,
-        phase: str,
-        folder: str,
-        ended: str,
-        now: datetime | None = None,
+        self, connection: Connection, person_id: int, phase: str, folder: str, ended: str
     ) -> None:
         """Record that a trial has ended. `folder` is its run directory, relative to the study's folder."""
-        values = {"folder": folder, "ended": ended, "finished": now or utc_now()}
+        values = {"folder": folder, "ended": ended, "finished": utc_now()}
         same = (trial.c.person_id == person_id, trial.c.phase == phase)
         if not (await connection.execute(update(trial).where(*same).values(**values))).rowcount:
             await connection.execute(insert(trial).values(person_id=person_id, phase=phase, **values))
@@ -203,20 +188,14 @@ class Endings(StorePart):
     """Store methods that end visits."""
 
     @transaction
-    async def finish(
-        self, connection: Connection, person_id: int, status: Status = "finished", now: datetime | None = None
-    ) -> bool:
+    async def finish(self, connection: Connection, person_id: int, status: Status = "finished") -> bool:
         """Set the final status of an active participant. Return False if the participant was not active.
 
         The participant's place is kept if the status is `finished`, and released otherwise.
         """
-        now = now or utc_now()
         await lock_study(connection, self._study_id)
-        active = person.c.status.in_(ACTIVE)
-        ended = await connection.execute(
-            update(person).where(person.c.id == person_id, active).values(seen=now)
-        )
-        if not ended.rowcount:
+        mine = (person.c.id == person_id, person.c.status.in_(ACTIVE))
+        if not (await connection.execute(update(person).where(*mine).values(seen=utc_now()))).rowcount:
             return False
         await end(connection, self._study_id, person_id, status)
         return True
@@ -232,15 +211,13 @@ class Endings(StorePart):
         return len(found)
 
     @transaction
-    async def withdraw(
-        self, connection: Connection, person_id: int, delete: bool, now: datetime | None = None
-    ) -> bool:
+    async def withdraw(self, connection: Connection, person_id: int, delete: bool) -> bool:
         """Withdraw a participant, who may already have finished the study. Return False if nothing changed.
 
         With `delete`, the answers are deleted immediately and the place is released. The number and platform ids are
         kept until all payments are made and :meth:`Store.erase` is called.
         """
-        now = now or utc_now()
+        now = utc_now()
         await lock_study(connection, self._study_id)
         mine = person.c.id == person_id
         may = person.c.status.in_((*ACTIVE, "finished"))

@@ -42,11 +42,11 @@ class Researchers:
 
         return PasswordHasher(memory_cost=self._memory_kib)
 
-    async def add(self, name: str, password: str, role: Role, now: datetime | None = None) -> Researcher:
+    async def add(self, name: str, password: str, role: Role) -> Researcher:
         """Add a researcher. Raises StoreError if the name is taken, or if the name or role is not valid."""
         if not NAME.fullmatch(name):
             raise StoreError(f"{name!r} cannot be a name: use up to 60 of a-z, 0-9 and the signs . _ @ -")
-        values = {"name": name, "role": _known(role), "disabled": False, "created": now or utc_now()}
+        values = {"name": name, "role": _known(role), "disabled": False, "created": utc_now()}
         values["password"] = await self._hash(password)
 
         async def work(connection: Connection) -> Researcher:
@@ -87,7 +87,6 @@ class Researchers:
         password: str | None = None,
         role: Role | None = None,
         disabled: bool | None = None,
-        now: datetime | None = None,
     ) -> None:
         """Change a researcher's password, role or access. All logins of the researcher are revoked."""
         values: dict[str, object] = {}
@@ -107,39 +106,34 @@ class Researchers:
             if values:
                 await connection.execute(update(researcher).where(researcher.c.id == who).values(**values))
             mine = (login.c.researcher_id == who, login.c.revoked.is_(None))
-            await connection.execute(update(login).where(*mine).values(revoked=now or utc_now()))
+            await connection.execute(update(login).where(*mine).values(revoked=utc_now()))
 
         await self._database.write(work)
 
     @transaction
     async def log_in(
-        self,
-        connection: Connection,
-        researcher_id: int,
-        token_hash: str,
-        expires: datetime,
-        now: datetime | None = None,
+        self, connection: Connection, researcher_id: int, token_hash: str, expires: datetime
     ) -> None:
         """Record a login. Only the SHA-256 of the login's token is stored."""
         values = {"researcher_id": researcher_id, "token_hash": token_hash, "expires": expires}
-        await connection.execute(insert(login).values(**values, created=now or utc_now()))
+        await connection.execute(insert(login).values(**values, created=utc_now()))
 
-    async def who(self, token_hash: str, now: datetime | None = None) -> Researcher | None:
+    async def who(self, token_hash: str) -> Researcher | None:
         """Return the researcher who is logged in with this token hash, or None."""
         query = (
             select(*_FIELDS)
             .join(login, login.c.researcher_id == researcher.c.id)
             .where(login.c.token_hash == token_hash, login.c.revoked.is_(None))
-            .where(login.c.expires > (now or utc_now()), researcher.c.disabled.is_(False))
+            .where(login.c.expires > utc_now(), researcher.c.disabled.is_(False))
         )
         async with self._database.reading() as connection:
             row = (await connection.execute(query)).first()
         return None if row is None else Researcher(*row)
 
     @transaction
-    async def log_out(self, connection: Connection, token_hash: str, now: datetime | None = None) -> None:
+    async def log_out(self, connection: Connection, token_hash: str) -> None:
         mine = (login.c.token_hash == token_hash, login.c.revoked.is_(None))
-        await connection.execute(update(login).where(*mine).values(revoked=now or utc_now()))
+        await connection.execute(update(login).where(*mine).values(revoked=utc_now()))
 
     async def _row(self, name: str) -> Any:
         async with self._database.reading() as connection:

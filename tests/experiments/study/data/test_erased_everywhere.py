@@ -14,6 +14,7 @@ from contextlib import closing
 import numpy as np
 import pyarrow.parquet
 import pytest
+from store_clock import at
 
 from experiments.cli.main import main
 from experiments.study.file import read_people_study
@@ -83,33 +84,32 @@ def runs(tmp_path_factory, house):
 async def _fill(study, folder, runs):
     store = await Store.open(f"sqlite:///{folder}/study.db", study.settings.name, study.sha256)
     for number, name in enumerate(PEOPLE, 1):
-        ids, token, at = (
-            {"PROLIFIC_PID": f"{name}-PID", "SESSION_ID": f"{name}-SUBMISSION"},
-            f"{number}" * 64,
-            day(name),
-        )
-        person = await store.arrive("prolific", f"{name}-key", ids, token, "consent", now=at)
-        await store.show_phase(person.id, "consent", at)
-        await store.finish_phase(
-            person.id, "consent", "task", {"agreed": True, "code": f"{name}-code"}, now=at
-        )
-        visit = folder / "visits" / token
-        shutil.copytree(runs / name, visit / "task")
-        (visit / "visit.json").write_text(json.dumps({"phase": "result", "seed": SEEDS[number - 1]}))
-        (visit / "journals" / "training").mkdir(parents=True)
-        (visit / "journals" / "training" / "journal.bin").write_bytes(f"{name}-journal".encode())
-        await store.finish_trial(person.id, "task", f"visits/{token}/task", "all delivered", now=at)
-        await store.finish_phase(person.id, "task", "survey", {}, "all delivered", now=at)
-        for draft in range(20):
-            await store.save_answers(person.id, "survey", {"comments": f"{name}-draft {draft} " * 40}, at)
-        answers = {"comments": f"{name}-wrote", "age": f"{name}-age"}
-        await store.finish_phase(person.id, "survey", "completion", answers, status="finished", now=at)
-        for kind in ("reward", "bonus"):
-            key = f"p{number:05d}-{kind}"
-            await store.ledger.decide(person.id, kind, 750, "USD", key, f"{name}-reason", at)
-            attempt = await store.ledger.begin_sending(key, at)
-            await store.ledger.confirm(key, attempt, f"{name}-receipt", now=at)
+        with at(day(name)):
+            await _take_part(store, folder, runs, number, name)
     await store.close()
+
+
+async def _take_part(store, folder, runs, number, name):
+    ids, token = {"PROLIFIC_PID": f"{name}-PID", "SESSION_ID": f"{name}-SUBMISSION"}, f"{number}" * 64
+    person = await store.arrive("prolific", f"{name}-key", ids, token, "consent")
+    await store.show_phase(person.id, "consent")
+    await store.finish_phase(person.id, "consent", "task", {"agreed": True, "code": f"{name}-code"})
+    visit = folder / "visits" / token
+    shutil.copytree(runs / name, visit / "task")
+    (visit / "visit.json").write_text(json.dumps({"phase": "result", "seed": SEEDS[number - 1]}))
+    (visit / "journals" / "training").mkdir(parents=True)
+    (visit / "journals" / "training" / "journal.bin").write_bytes(f"{name}-journal".encode())
+    await store.finish_trial(person.id, "task", f"visits/{token}/task", "all delivered")
+    await store.finish_phase(person.id, "task", "survey", {}, "all delivered")
+    for draft in range(20):
+        await store.save_answers(person.id, "survey", {"comments": f"{name}-draft {draft} " * 40})
+    answers = {"comments": f"{name}-wrote", "age": f"{name}-age"}
+    await store.finish_phase(person.id, "survey", "completion", answers, status="finished")
+    for kind in ("reward", "bonus"):
+        key = f"p{number:05d}-{kind}"
+        await store.ledger.decide(person.id, kind, 750, "USD", key, f"{name}-reason")
+        attempt = await store.ledger.begin_sending(key)
+        await store.ledger.confirm(key, attempt, f"{name}-receipt")
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from store_clock import at
 
 from experiments.analysis.study.table import read_people
 from experiments.cli.main import main
@@ -189,7 +190,8 @@ def test_who_people_are_is_forgotten_by_date(served, tmp_path, capsys):
                 await store.ledger.decide(1, "reward", 750, "USD", "p00001-reward", "finished")
             later = utc_now() + datetime.timedelta(days=days)
             visits = tmp_path / "served" / "visits"
-            return await forget_old(store, visits, 30, now=later, **options)
+            with at(later):
+                return await forget_old(store, visits, 30, **options)
         finally:
             await store.close()
 
@@ -220,7 +222,8 @@ def test_forgetting_that_was_interrupted_is_finished_later(served, tmp_path, mon
         store = await _open(served)
         try:
             later = utc_now() + datetime.timedelta(days=31)
-            await forget_old(store, tmp_path / "served" / "visits", 30, now=later)
+            with at(later):
+                await forget_old(store, tmp_path / "served" / "visits", 30)
         finally:
             await store.close()
 

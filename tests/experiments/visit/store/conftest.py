@@ -8,6 +8,7 @@ import pytest
 from database_servers import SERVERS, MissingProgramError
 from sqlalchemy import make_url, text
 from sqlalchemy.ext.asyncio import create_async_engine
+from store_clock import at
 from study_database import new_database
 
 from experiments.visit.store import Store
@@ -93,6 +94,7 @@ def arrive(store):
     """Lets somebody arrive, by number."""
 
     async def somebody(number=1, key=None, now=None, phase="consent"):
-        return await store.arrive("link", key, {"participant": f"p{number}"}, f"{number:064x}", phase, now)
+        with at(now):
+            return await store.arrive("link", key, {"participant": f"p{number}"}, f"{number:064x}", phase)
 
     return somebody

@@ -5,6 +5,7 @@ from datetime import timedelta
 
 import numpy as np
 import pytest
+from store_clock import at
 
 from experiments.errors import StoreError
 from experiments.visit.store import CellQuota, Store
@@ -20,7 +21,8 @@ CELLS = [CellQuota(3, (10, 11, 12)), CellQuota(2, (20,))]
 def assign(store):
     async def place(person, cells=CELLS, rule="balanced", now=None, side=None, seed=0):
         rng = np.random.default_rng(seed)
-        return await (side or store).assign(person.id, cells, rule, rng, now or person.created, ABANDONED)
+        with at(now):
+            return await (side or store).assign(person.id, cells, rule, rng, ABANDONED)
 
     return place
 
@@ -76,8 +78,9 @@ async def test_an_abandoned_place_goes_to_the_next_person_and_a_finished_one_doe
     given = [await assign(person) for person in people[:5]]
     await store.finish(people[0].id)
     later = people[0].created + 2 * ABANDONED
-    for person in people[2:5]:
-        await store.beat(person.id, later)
+    with at(later):
+        for person in people[2:5]:
+            await store.beat(person.id)
     got = await assign(people[5], now=later)
     assert (got.cell, got.place) == (given[1].cell, given[1].place)
     assert await assign(people[6], now=later) is None

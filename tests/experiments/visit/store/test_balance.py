@@ -7,6 +7,7 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
+from store_clock import at
 
 from experiments.study.file import TASK, TRAINING
 from experiments.study.rehearsal.plan import plan_people
@@ -29,26 +30,26 @@ async def finished_by_cell(url, seed):
     people = {}
     heapq.heapify(events)
     while events:
-        at, number, phase = heapq.heappop(events)
-        one, now = planned[number], BEGAN + timedelta(seconds=at)
+        seconds, number, phase = heapq.heappop(events)
+        one, now = planned[number], at(BEGAN + timedelta(seconds=seconds))
         name = PHASES[phase]
-        if phase == 0:
-            people[number] = await store.arrive("rehearsal", None, {}, f"{number:064x}", name, now)
-        person = people[number].id
-        if name == TRAINING and await store.assign(person, CELLS, "balanced", rng, now, ABANDONED) is None:
-            continue
-        if name == TASK:
-            await store.beat(person, now)
-        if one.leaves and one.leaves_in == name:
-            if one.leaves.startswith("withdraws"):
-                await store.withdraw(person, delete=False, now=now)
-            continue
-        last = name == PHASES[-2]
-        if last:
-            await store.finish_phase(person, PHASES[0], PHASES[-1], status="finished", now=now)
-            continue
+        with now:
+            if phase == 0:
+                people[number] = await store.arrive("rehearsal", None, {}, f"{number:064x}", name)
+            person = people[number].id
+            if name == TRAINING and await store.assign(person, CELLS, "balanced", rng, ABANDONED) is None:
+                continue
+            if name == TASK:
+                await store.beat(person)
+            if one.leaves and one.leaves_in == name:
+                if one.leaves.startswith("withdraws"):
+                    await store.withdraw(person, delete=False)
+                continue
+            if name == PHASES[-2]:
+                await store.finish_phase(person, PHASES[0], PHASES[-1], status="finished")
+                continue
         minutes = MINUTES[name] * float(rng.lognormal(0.0, 0.35)) + 10.0 * (one.returns_in == name)
-        heapq.heappush(events, (at + 60.0 * minutes, number, phase + 1))
+        heapq.heappush(events, (seconds + 60.0 * minutes, number, phase + 1))
     cells = (await store.counts()).cells
     await store.close()
     return [count.finished for count in cells.values()]

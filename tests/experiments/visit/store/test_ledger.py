@@ -7,6 +7,7 @@ from itertools import count
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from store_clock import at
 
 from experiments.errors import StoreError
 from experiments.visit.store import Store
@@ -56,10 +57,13 @@ async def test_only_one_of_many_may_send_and_only_after_failure_again(store, url
 
 async def test_what_is_being_sent_is_in_doubt_after_ten_minutes(store, arrive):
     person, ledger = await arrive(), store.ledger
-    await ledger.decide(person.id, "reward", 750, "USD", "r", now=NOON)
-    await ledger.begin_sending("r", now=NOON)
-    assert await ledger.owed(now=NOON + timedelta(minutes=9)) == ()
-    [owed] = await ledger.owed(now=NOON + timedelta(minutes=10))
+    with at(NOON):
+        await ledger.decide(person.id, "reward", 750, "USD", "r")
+        await ledger.begin_sending("r")
+    with at(NOON + timedelta(minutes=9)):
+        assert await ledger.owed() == ()
+    with at(NOON + timedelta(minutes=10)):
+        [owed] = await ledger.owed()
     assert (owed.in_doubt, owed.attempt) == (True, 1)
 
 
@@ -110,25 +114,31 @@ class Platform:
 
 async def payer(ledger, platform):
     """Pays what is owed; stops for a moment at each `yield`, where it may be killed."""
-    for owed in await ledger.owed(platform.now):
+    with at(platform.now):
+        found = await ledger.owed()
+    for owed in found:
         yield
         if owed.in_doubt:
             known = owed.key in platform.paid
             yield
             if known:
-                await ledger.confirm(owed.key, owed.attempt, "found", now=platform.now)
+                with at(platform.now):
+                    await ledger.confirm(owed.key, owed.attempt, "found")
                 continue
-            await ledger.fail(owed.key, owed.attempt, "unknown to the platform", platform.now)
+            with at(platform.now):
+                await ledger.fail(owed.key, owed.attempt, "unknown to the platform")
             yield
         begun = platform.now
-        attempt = await ledger.begin_sending(owed.key, begun)
+        with at(begun):
+            attempt = await ledger.begin_sending(owed.key)
         yield
         if attempt is None or platform.now - begun > timedelta(minutes=5):
             continue
         platform.ask(owed.key)
         yield
         if owed.key in platform.paid:
-            await ledger.confirm(owed.key, attempt, "paid", now=platform.now)
+            with at(platform.now):
+                await ledger.confirm(owed.key, attempt, "paid")
         yield
 
 
@@ -159,7 +169,8 @@ async def _pay(store, steps, number):
     person = await store.arrive("link", None, {}, f"{number:064x}", "consent")
     keys = [f"{person.id}-{kind}" for kind in ("reward", "bonus")]
     for key in keys:
-        await ledger.decide(person.id, key.partition("-")[2], 750, "USD", key, now=NOON)
+        with at(NOON):
+            await ledger.decide(person.id, key.partition("-")[2], 750, "USD", key)
     payers = [payer(ledger, platform) for _ in range(3)]
     for what, value, times in steps:
         if what == "wait":
@@ -179,4 +190,5 @@ async def _pay(store, steps, number):
         async for _ in payer(ledger, platform):
             platform.deliver(platform.now)
     assert sorted(platform.paid) == sorted(keys)
-    assert await ledger.owed(platform.now + timedelta(days=1)) == ()
+    with at(platform.now + timedelta(days=1)):
+        assert await ledger.owed() == ()

@@ -4,6 +4,7 @@ import asyncio
 from datetime import UTC, datetime, timedelta
 
 import pytest
+from store_clock import at
 
 from experiments.errors import StoreError
 
@@ -32,7 +33,8 @@ async def test_the_same_platform_id_is_the_same_person_whatever_the_link(store, 
 async def test_those_without_a_sign_of_life_time_out(store, arrive):
     early, late = datetime(2026, 5, 1, 12, tzinfo=UTC), datetime(2026, 5, 1, 13, tzinfo=UTC)
     gone, there, finished = await arrive(1, now=early), await arrive(2, now=late), await arrive(3, now=early)
-    await store.finish(finished.id, now=early)
+    with at(early):
+        await store.finish(finished.id)
     assert await store.time_out(late) == 1
     assert await store.time_out(late) == 0
     statuses = [(await store.person(person.id)).status for person in (gone, there, finished)]
@@ -52,15 +54,16 @@ async def test_keys_that_differ_in_case_alone_are_two_people(arrive):
 
 async def test_a_sign_of_life_never_goes_back_in_time(store, arrive):
     person = await arrive(1, now=datetime(2026, 5, 1, 12, tzinfo=UTC))
-    await store.beat(person.id, person.seen + timedelta(minutes=1))
-    await store.beat(person.id, person.seen)
+    for moment in (person.seen + timedelta(minutes=1), person.seen):
+        with at(moment):
+            await store.beat(person.id)
     assert (await store.person(person.id)).seen == person.seen + timedelta(minutes=1)
 
 
 async def test_a_time_without_a_zone_is_refused(store, arrive):
     person = await arrive(1)
-    with pytest.raises(StoreError, match="no time zone"):
-        await store.beat(person.id, datetime(2026, 5, 1, 12))
+    with at(datetime(2026, 5, 1, 12)), pytest.raises(StoreError, match="no time zone"):
+        await store.beat(person.id)
 
 
 async def test_an_unknown_person_is_an_error_that_names_the_number(store):

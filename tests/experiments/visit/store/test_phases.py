@@ -4,6 +4,7 @@ import asyncio
 from datetime import timedelta
 
 import pytest
+from store_clock import at
 
 from experiments.visit.store import Store
 
@@ -69,18 +70,22 @@ def _name(number):
 
 async def test_when_a_phase_was_shown_first_counts(store, arrive):
     person = await arrive()
-    first = await store.show_phase(person.id, "consent", person.created)
-    assert await store.show_phase(person.id, "consent", person.created + timedelta(minutes=1)) == first
+    with at(person.created):
+        first = await store.show_phase(person.id, "consent")
+    with at(person.created + timedelta(minutes=1)):
+        assert await store.show_phase(person.id, "consent") == first
     end = person.created + timedelta(minutes=2)
-    assert await store.finish_phase(person.id, "consent", "story", reason="read", now=end)
+    with at(end):
+        assert await store.finish_phase(person.id, "consent", "story", reason="read")
     [phase] = await store.phases(person.id)
     assert (phase.duration_s, phase.reason, phase.ended) == (120.0, "read", end)
 
 
 async def test_a_clock_that_steps_back_makes_no_negative_duration(store, arrive):
     person = await arrive()
-    await store.show_phase(person.id, "consent", person.created)
-    await store.finish_phase(person.id, "consent", "story", now=person.created - timedelta(hours=1))
+    await store.show_phase(person.id, "consent")
+    with at(person.created - timedelta(hours=1)):
+        await store.finish_phase(person.id, "consent", "story")
     assert [phase.duration_s for phase in await store.phases()] == [0.0]
 
 
