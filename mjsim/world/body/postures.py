@@ -1,7 +1,7 @@
 """Kernels that update the hand postures in each control step and keep carried objects in free space.
 
-If an object nevertheless touches a static geom, the hand yields along the contact normal, up to a limit.
-Beyond this limit, the body stops walking or turning into the contact.
+If an object nevertheless touches a static geom, the hand presses on it only gently and yields along the contact
+normal, up to a limit. Beyond this limit, the body stops walking or turning into the contact.
 """
 
 import math
@@ -20,6 +20,9 @@ Ints = NDArray[np.int32]
 # Horizontal part of a contact normal above which the object touches an obstacle and not a surface below it.
 UPRIGHT = 0.3
 
+# Distance between the target and the position of a hand that an obstacle stops, in metres. The servo then pushes with
+# 20 N.
+_PRESS = 0.01
 _ARRIVED = 0.0005  # distance to the goal at which a hand stops, in metres
 
 
@@ -170,6 +173,7 @@ def _give_way(
     away_f, away_l = c * nx + s * ny, c * ny - s * nx
     swing = (away_l * target[0] - away_f * target[1]) * command[TURN]
     approach = -(away_f * command[FORWARD] + away_l * command[LEFT] + swing)
+    _slacken(hand, away_f, away_l, body.pose, hands)
     push = (max(approach, 0.0) + carrying.push_back) * dt
     offset[0] += away_f * push
     offset[1] += away_l * push
@@ -184,3 +188,20 @@ def _give_way(
         if into < 0.0:
             command[FORWARD] -= into * away_f
             command[LEFT] -= into * away_l
+
+
+@kernel
+def _slacken(hand: int, away_f: float, away_l: float, pose: Floats, hands: Hands) -> None:
+    """Let a hand's target be at most `_PRESS` metres behind the obstacle that stops the hand.
+
+    Otherwise, friction at the obstacle would hold the object, so that the hand could not slide past it.
+    """
+    target, velocity = hands.targets[hand], hands.velocities[hand]
+    ahead = away_f * (target[0] - pose[4 + 3 * hand]) + away_l * (target[1] - pose[5 + 3 * hand])
+    if ahead < -_PRESS:
+        target[0] -= (ahead + _PRESS) * away_f
+        target[1] -= (ahead + _PRESS) * away_l
+    speed = away_f * velocity[0] + away_l * velocity[1]
+    if speed < 0.0:
+        velocity[0] -= speed * away_f
+        velocity[1] -= speed * away_l

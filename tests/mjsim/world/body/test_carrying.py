@@ -1,5 +1,6 @@
-"""Two carried loads: the right one passes above the left one, because side by side they would catch on each other."""
+"""Carried loads: the right one passes above the left one, and a hand presses only gently on an obstacle."""
 
+import numpy as np
 import pytest
 from small_worlds import do, scene_of, world_of
 
@@ -22,3 +23,23 @@ def test_the_right_load_rises_while_the_hands_pass_each_other(small_catalogue, a
     carrying.update(avatar.CARRY)
     assert (person.hand_velocities[1, 2] > 0.01) == rises
     assert abs(person.hand_velocities[0, 2]) < 0.01
+
+
+@pytest.mark.parametrize("blocked", [True, False])
+def test_a_hand_whose_load_an_obstacle_stops_hardly_presses_on_it_so_that_it_can_slide_past(
+    small_catalogue, monkeypatch, blocked
+):
+    world = world_of(scene_of(small_catalogue, (1.5, 2.0, 0.0), ("cube", 2.0, 2.0), height=0.001))
+    do(world, Pick("o0"))
+    person, carrying = world._tier.person, world._tier.carrying
+    hand, scene = person.held.index(0), world.scene
+    wall = int(np.flatnonzero(carrying._owners == -1)[0])
+    geoms = np.array([[scene.index.geoms("o0")[0], wall]], np.int32)
+    frames = np.eye(3).reshape(1, 9)  # The obstacle is ahead, because the normal points from the load to it.
+    contacts = geoms, frames, carrying._owners
+    monkeypatch.setattr(carrying, "_contacts", lambda: contacts if blocked else carrying._no_contacts)
+    person.rig.hand_targets[hand, :2] = person.rig.hands[hand, :2] + 0.1
+    carrying.update(avatar.CARRY)
+    ahead, aside = (person.rig.hand_targets - person.rig.hands)[hand, :2]
+    assert (ahead < 0.02) == blocked
+    assert aside > 0.08
