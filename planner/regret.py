@@ -259,7 +259,7 @@ def _around_best(
     while is_searched:
         longest = best + math.floor(min(radius / unit, dearest))
         most = min(MAX_STATES, search.share(problem))
-        costs, states = costs_by_pass(bound, list(possible_next(problem)), longest, most, end)
+        costs, states = costs_by_pass(bound, problem.names[:n], problem.names[n:], longest, most, end)
         search.spend(states)
         if costs is not None:
             return _ranked(problem, costs, unit, longest, least)
@@ -271,7 +271,7 @@ def _around_best(
 def _least(bound: Bound, problem: RoutingProblem) -> Costs:
     """Return a lower bound on the cost of each possible next visit, in units."""
     n, table = len(problem.shipments), bound.table
-    relaxed = costs_in(bound.instance, table, len(table.bin) - 1, problem.names[:n], problem.names[n:])
+    relaxed = costs_in(bound.moves, table, len(table.bin) - 1, problem.names[:n], problem.names[n:])
     return {visit: cost - bound.prices for visit, cost in relaxed.items()}
 
 

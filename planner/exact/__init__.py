@@ -7,6 +7,7 @@ proof works" in docs/planners.md explains the method.
     full_table    a table over all subsets of the objects
     task_table    a full table that is reused for successive states of a task
     instance      a routing problem as integer arrays
+    moves         all moves of a tour, which the tables and searches share
     table         the recursion and its relaxation, and NumPy code for small tables
       table_kernels   compiled code for tables of any size
     search        annealing, followed by beam searches of increasing width

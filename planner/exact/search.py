@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.exact.annealing import anneal, completed, tour_actions
-from planner.exact.expand import PLACE_BITS, expand, offer_roots
+from planner.exact.expand import PLACE_BITS, expand, offer_first
 from planner.exact.instance import MAX_SEARCHED, Instance
 from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown, warm_bound
 from planner.exact.nodes import FIRST_ROOM, NO_PARENT, keep_best, new_nodes
 from planner.exact.table import BIN_ROWS, INFINITE, Solution
 from planner.exact.warm_start import Start
-from planner.plan import Certificate, Proof
 from planner.solvers import NEVER, Deadline
 
 # Moves of the annealing of a first tour, and its temperatures relative to the mean leg
@@ -38,7 +37,7 @@ def improving_tours(
     a warm start. No pass begins after the deadline.
     """
     bound, upper, lower, actions, expanded = _first_tour(instance, seed, work, start, warm_rows)
-    yield Solution(actions, min(lower, upper), _certificate(bound), expanded)
+    yield Solution(actions, min(lower, upper), bound.certificate, expanded)
     done, rate, by_bin = 0, max(1, len(instance.home) // 2), False
     for rows, wanted in passes if len(instance.home) <= MAX_SEARCHED else ():
         # An unfinished pass proves nothing, so choose a width that the remaining work allows.
@@ -56,7 +55,7 @@ def improving_tours(
         lower = max(lower, bound.root, result.lower)
         if result.actions is not None:
             upper, actions = result.upper, result.actions
-        yield Solution(actions, min(lower, upper), _certificate(bound), expanded)
+        yield Solution(actions, min(lower, upper), bound.certificate, expanded)
 
 
 def _first_tour(
@@ -79,14 +78,6 @@ def _first_tour(
     return bound, upper, lower, actions, expanded
 
 
-def _certificate(bound: Bound) -> Certificate:
-    table = bound.table
-    groups = tuple(tuple(np.flatnonzero(table.group == g).tolist()) for g in range(len(table.size)))
-    return Certificate(
-        Proof.RELAXATION, bound.instance.unit, bound.root, groups, tuple(table.multipliers.tolist())
-    )
-
-
 class Pass(NamedTuple):
     """The result of one pass of the search."""
 
@@ -106,13 +97,13 @@ def beam_pass(bound: Bound, upper: int, width: int, max_states: int, deadline: D
     limit = upper - bound.instance.tie + prices
     history: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
     here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
-    offer_roots(bound.instance, bound.table, here, after, limit)
+    offer_first(bound.moves, bound.table, here, after, limit)
     left_out, expanded, actions = INFINITE, 0, None
     for layer in range(n + 1):
         if expanded > max_states or deadline.over():
             return Pass(upper, None, bound.root, expanded)
         here, worse = keep_best(here, width)
-        found = expand(bound.instance, bound.table, here, after, limit, width, deadline)
+        found = expand(bound.moves, bound.table, here, after, limit, width, deadline)
         if found is None:
             return Pass(upper, None, bound.root, expanded)
         here, after, early, states, end = found

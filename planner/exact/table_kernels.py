@@ -136,7 +136,7 @@ def fill_rows(inst: Instance, table: CostTable, first: int, last: int) -> None:
     Bins and the objects of each bin are processed eight at a time. The results of unused lanes are ignored.
     """
     n, m = inst.to_bin.shape
-    wide, dtype, entries, width = lanes_for(m), table.entries.dtype, table.entries, 2 * m * m + n
+    wide, dtype, entries, width = lanes_for(m), table.entries.dtype, table.entries, table.width
     legs, left = legs_of(inst, table), left_of(table, first)
     picked, second = np.empty(n, np.int64), np.empty(n * wide, dtype)  # indices of objects, and values of W
     empty, carrying = np.empty(wide, dtype), np.empty(m * wide, dtype)  # values of E and V in a row

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from planner.exact.full_table import filled_table, follow
 from planner.exact.instance import FAR, Instance, make_instance, to_visits
+from planner.exact.moves import moves_of
 from planner.exact.table import CostTable
 from planner.plan import Certificate, Plan, Proof, Visit
 from planner.problem import RoutingProblem, make_plan
@@ -52,7 +53,7 @@ class TaskTable:
         state = self._at(problem)
         if state is None:
             return None
-        length, actions = follow(state.instance, state.table, state.row)
+        length, actions = follow(moves_of(state.instance), state.table, state.row)
         visits = to_visits(state.instance, actions, state.names, problem.names[len(problem.shipments) :])
         certificate = Certificate(Proof.FULL_TABLE, state.unit, length)
         return make_plan(problem, state.metric, visits, length, started, certificate)
@@ -68,7 +69,7 @@ class TaskTable:
         if state is None:
             return None
         carried = problem.names[len(problem.shipments) :]
-        return costs_in(state.instance, state.table, state.row, state.names, carried), state.unit
+        return costs_in(moves_of(state.instance), state.table, state.row, state.names, carried), state.unit
 
     def fits(self, problem: RoutingProblem) -> bool:
         """Return True if a full table can be used for a problem."""
