@@ -244,8 +244,6 @@ def _around_best(
         plan = search.plan(problem, limit=limit)
     else:
         search.learn(problem, plan)
-    if search.by_cuts(problem):
-        return _estimated(plan, search.least(problem, limit), problem.integers.unit)
     metric, unit = problem.integers.metric, problem.integers.unit
     best = int(tour_length(problem, plan.visits, metric))
     is_searched, end = plan.status is Status.OPTIMAL and search.share(problem) > 0, Deadline.of(limit)

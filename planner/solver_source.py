@@ -65,7 +65,8 @@ class SolverSource(PlanSource):
     With the exact planner, plans that the participant does not see reuse earlier results. These are the full
     table if it is small enough, or else the multipliers of the lower bound. All searches after the first one
     share a budget of states. With more than 24 objects, the first plan has a smaller limit than other plans of
-    the solver, and all later plans reuse its cuts. The same sequence of states always gives the same plans.
+    the solver, and all later plans anneal the rest of the last one. The same sequence of states always gives the
+    same plans.
 
     If `start` is set, `plan` returns a first plan within about 50 ms and starts a background search for a
     better one, which takes up to 20 s by default. The search reuses the multipliers of earlier bounds and the

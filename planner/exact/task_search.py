@@ -3,28 +3,22 @@
 import math
 import time
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from planner.exact.instance import Instance, make_instance, to_visits
 from planner.exact.solver import ExactSolver
 from planner.exact.table import Solution
 from planner.exact.warm_start import NOTHING_KNOWN, Start
-from planner.plan import Certificate, Plan, Proof, Status, Visit
-from planner.problem import RoutingProblem, make_plan, possible_next
+from planner.plan import Plan, Proof, Status
+from planner.problem import RoutingProblem, make_plan
 from planner.solvers import Deadline, SolveLimit
-
-if TYPE_CHECKING:  # imported only if there are many objects, because this loads MathOpt
-    from planner.exact.cuts.connectivity import Cut
-    from planner.exact.cuts.known_cuts import KnownCuts
 
 TASK_WORK = 3_000_000  # default number of states that all searches of a task expand together
 TABLE_OBJECTS = 18  # number of objects from which on a full table replaces the searches
-PAUSE = 2  # number of objects that must be picked up before a search after one without a proof, or before more cuts
+PAUSE = 2  # number of objects that must be picked up before a search after one without a proof
 HURRIED_ROWS = 600  # maximum number of rows in a table that is filled after the search was stopped
 SEARCHES = 2  # number of searches per object, one after it is picked up and one after it is placed
-MOVES, TEMPERATURES = 20_000, (0.05, 0.01)  # annealing of an earlier tour with more than 24 objects, in 20 ms
-WIDE = 0.02  # gap between bound and tour, relative to the tour, at which cuts are added
-CUTS_WORK = 1_000_000  # enough work for a brief search by cuts
+# Annealing of an earlier tour with more than 24 objects, and the number of rows in the table that bounds it
+MOVES, TEMPERATURES, ROWS = 20_000, (0.05, 0.01), 600
 
 
 class TaskSearch:
@@ -36,8 +30,7 @@ class TaskSearch:
     multipliers serve all later searches. Without states, a plan results from annealing and these multipliers.
     Results are reproducible unless `limit` contains a time or a stop event.
 
-    With more than 24 objects, the last tour is annealed, and the cuts of an earlier plan bound it. This takes 30 ms.
-    If the bound is weak, cuts are added, which takes 0.5 s. `limit.work` does not apply.
+    With more than 24 objects, the last tour is annealed, and fitted multipliers bound it. `limit.work` does not apply.
 
     Args:
         solver: Exact planner, whose passes are used.
@@ -51,41 +44,27 @@ class TaskSearch:
         self.left = (limit and limit.work) or TASK_WORK
         self._solver = solver
         self._warm = NOTHING_KNOWN
-        self._cuts: KnownCuts | None = None
-        self._refined = math.inf  # number of loose objects when cuts were last added
+        self._began_by_cuts = False
         self._most = math.inf  # number of loose objects up to which a proof seems possible
 
     def applies(self, problem: RoutingProblem) -> bool:
         return self._solver.applies(problem)
 
     def learn(self, problem: RoutingProblem, plan: Plan) -> None:
-        """Use the order of a plan for this problem, and its multipliers or cuts, in later searches."""
+        """Use the order of a plan for this problem, and its multipliers if it has any, in later searches."""
         self._warm = self._warm.updated(problem, plan)
-        if plan.certificate is not None and plan.certificate.proof is Proof.CUTS:
-            from planner.exact.cuts.known_cuts import KnownCuts
-
-            if self._cuts is not None:  # another search has added cuts just now
-                self._refined = len(problem.shipments)
-            self._cuts = KnownCuts.of(problem, plan.certificate, self._cuts)
+        self._began_by_cuts |= plan.certificate is not None and plan.certificate.proof is Proof.CUTS
 
     def by_cuts(self, problem: RoutingProblem) -> bool:
-        """Return True if a problem is too large for searches, so that its plans are only bounded by cuts."""
+        """Return True if a problem is too large for searches, so that only a first plan may be proven."""
         applies = self._solver.applies(problem)
         return applies and self._solver.uses_cuts(make_instance(problem, problem.integers.metric))
 
     def continues(self, problem: RoutingProblem) -> bool:
         """Return True if shown plans reuse earlier results, because the task began with too many objects."""
-        if not self._solver.applies(problem) or self._cuts is None:
+        if not self._solver.applies(problem) or not self._began_by_cuts:
             return self.by_cuts(problem)
         return not self._solver.table_fits(make_instance(problem, problem.integers.metric))
-
-    def least(self, problem: RoutingProblem, limit: SolveLimit | None = None) -> dict[Visit, int]:
-        """Return a lower bound on the cost of each possible next visit in units, from cuts."""
-        if self._cuts is None:
-            self.plan(problem, limit=limit)
-        if self._cuts is None:  # the search was stopped
-            return dict.fromkeys(possible_next(problem), 0)
-        return self._cuts.least(problem)
 
     def start(self, problem: RoutingProblem, instance: Instance) -> Start | None:
         """Return a warm start for a problem, or None if nothing is known about its objects."""
@@ -93,6 +72,8 @@ class TaskSearch:
 
     def share(self, problem: RoutingProblem) -> int:
         """Return the number of states that a search for this problem may expand."""
+        if self.by_cuts(problem):
+            return 0
         if not self._warm.multipliers:
             return self.left // 2
         if len(problem.shipments) > self._most:
@@ -106,8 +87,8 @@ class TaskSearch:
         """Return the best plan within the share of this problem, to which the solver must apply."""
         started, metric = time.perf_counter(), problem.integers.metric
         instance, n = make_instance(problem, metric), len(problem.shipments)
-        by_cuts, stopped = self._solver.uses_cuts(instance), limit is not None and limit.stopped
-        work = 0 if by_cuts or stopped else self.share(problem)
+        by_cuts, stopped = self.by_cuts(problem), limit is not None and limit.stopped
+        work = 0 if stopped else self.share(problem)
         if by_cuts:
             best = self._bounded(problem, instance, seed, Deadline.of(limit))
         else:
@@ -127,23 +108,9 @@ class TaskSearch:
 
     def _bounded(self, problem: RoutingProblem, instance: Instance, seed: int, end: Deadline) -> Solution:
         from planner.exact.annealing import anneal, completed, tour_actions
-        from planner.exact.cuts.branch_and_cut import tours_by_cuts
-        from planner.exact.cuts.graph import state_graph
-        from planner.exact.cuts.known_cuts import KnownCuts
+        from planner.exact.multipliers import first_bound, grown
 
-        n, known = len(problem.shipments), self._cuts
-        order = completed(instance, self._warm.indices(problem.names[:n]))
+        order = completed(instance, self._warm.indices(problem.names[: len(problem.shipments)]))
         length, order = anneal(instance, seed, MOVES, order, *TEMPERATURES)
-        proof, bound = Certificate(Proof.CUTS, instance.unit, 0, multipliers=(0,) * n), 0
-        cuts: tuple[Cut, ...] = ()
-        if known is not None:
-            root = known.root(problem, instance, state_graph(instance))
-            cuts = tuple(cut for cut, _ in root.cuts)
-            proof, bound = root.certificate(instance.unit, known.certificate.parts), root.value
-        first = Solution(tour_actions(instance, order).tolist(), min(bound, length), proof)
-        if bound >= (1 - WIDE) * length or n > self._refined - PAUSE:
-            return first
-        *_, best = first, *tours_by_cuts(instance, seed, CUTS_WORK, end, first, cuts)
-        if best.certificate is not proof:
-            self._cuts, self._refined = KnownCuts.of(problem, best.certificate, known), n
-        return best
+        bound = grown(first_bound(instance, length), length, ROWS, end)
+        return Solution(tour_actions(instance, order).tolist(), min(bound.root, length), bound.certificate)

@@ -5,6 +5,5 @@ graph           states as nodes, so that a tour is a connected flow
 connectivity    cuts that flows other than tours violate
 flow_model      models of flows for the solvers of OR-Tools
 root_bound      an exact bound from a solver's multipliers
-known_cuts      cuts of an earlier plan, which bound later states
 tours           tours from integer flows
 """

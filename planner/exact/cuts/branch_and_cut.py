@@ -6,7 +6,7 @@ is optimal. Otherwise, cuts that its cycles violate are added, and the smaller p
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -26,10 +26,9 @@ from planner.solvers import Deadline
 
 RESTARTS, MOVES, TEMPERATURES = 4, 100_000, (0.3, 0.02)  # annealing before the first round, in about 0.5 s
 REPAIR_MOVES, REPAIR_TEMPERATURES = 20_000, (0.05, 0.01)  # annealing of a flow's joined cycles
-ROUNDS, BRIEF_ROUNDS = 50, 2  # maximum number of linear relaxations, also in a brief search
+ROUNDS = 50  # maximum number of linear relaxations
 STEP_S = 0.1  # time that a step may take after it can no longer be interrupted, in seconds
-# Number of arcs in the first integer round, which often finds a shortest tour within 0.5 s, and in a brief search
-CORE, BRIEF_CORE = 1_000, 600
+CORE = 1_000  # number of arcs in the first integer round, which often finds a shortest tour within 0.5 s
 NEW_CUTS = 60  # maximum number of cuts that are added in a round
 PATIENCE, PROGRESS = 5, 2e-4  # number of rounds in which the bound must rise by this share of itself
 ROUND_WORK, NODE_WORK = 20_000, 40_000  # work of a round and of a node, in expanded states that take as long
@@ -43,16 +42,12 @@ def tours_by_cuts(
     work: int,
     deadline: Deadline,
     first: Solution,
-    known: Sequence[Cut] | None = None,
 ) -> Iterator[Solution]:
-    """Yield better tours and bounds than those of a first solution, until a tour is proven or the budget is spent.
-
-    If cuts of an earlier plan are given, the search is brief. It then neither anneals a first tour nor branches.
-    """
+    """Yield better tours and bounds than those of a first solution, until a tour is proven or the budget is spent."""
     search = _Search(instance, work, deadline, first)
     if search.ended:
         return
-    for _ in search.steps(seed) if known is None else search.brief_steps(seed, known):
+    for _ in search.steps(seed):
         yield search.solution
         if search.ended:
             return
@@ -95,7 +90,7 @@ class _Search:
             self.work -= MOVES
             self._anneal(seed + k, MOVES, np.arange(n), TEMPERATURES)
             yield
-        yield from self._rounds(ROUNDS)
+        yield from self._rounds()
         more, arcs = self.root is not None, CORE
         while more and self.work >= NODE_WORK and self.deadline.left > STEP_S:
             found_cycles, all_arcs = (
@@ -105,18 +100,11 @@ class _Search:
             yield
             more, arcs = found_cycles or arcs < all_arcs, all_arcs
 
-    def brief_steps(self, seed: int, known: Sequence[Cut]) -> Iterator[None]:
-        self.known = {(cut.object, cut.inside.tobytes()): cut for cut in known}
-        yield from self._rounds(BRIEF_ROUNDS)
-        if self.root is not None:
-            self._integer_round(1, seed, BRIEF_CORE)
-            yield
-
-    def _rounds(self, rounds: int) -> Iterator[None]:
+    def _rounds(self) -> Iterator[None]:
         """Solve linear relaxations, and add the cuts that their flows violate."""
-        model = FlowModel(self.graph, self.step, list(self.known.values()), integer=False)
+        model = FlowModel(self.graph, self.step, [], integer=False)
         solver, bounds = FractionalSolver(model), [-math.inf] * PATIENCE
-        for _ in range(min(rounds, self.work // ROUND_WORK)):
+        for _ in range(min(ROUNDS, self.work // ROUND_WORK)):
             result = solver.solve(self.deadline) if self.deadline.left > STEP_S else None
             if result is None:
                 return

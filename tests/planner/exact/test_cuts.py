@@ -17,7 +17,6 @@ from planning_cases import Task, expected, grid_problem, random_problem, two_roo
 from planner.checker import check, verify_optimal
 from planner.cuts_checker import cuts_bound
 from planner.errors import ProblemError
-from planner.exact import task_search
 from planner.exact.cuts import branch_and_cut
 from planner.exact.cuts.branch_and_cut import tours_by_cuts
 from planner.exact.cuts.flow_model import FlowModel, integer_flow
@@ -29,7 +28,6 @@ from planner.exact.task_search import TaskSearch
 from planner.plan import Certificate, Plan, Proof, Status, VisitKind
 from planner.problem import make_plan, possible_next, tour_length
 from planner.problem_json import claim_from_json, claim_to_json
-from planner.regret import regrets
 from planner.solver_source import SolverSource
 from planner.solvers import NEVER, Deadline, SolveLimit, solver
 from planner.task_problems import TaskProblems
@@ -252,52 +250,23 @@ def random_walk(problem, seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
-def test_cuts_of_a_plan_bound_the_tours_and_the_next_visits_of_all_later_states(seed):
+def test_plans_for_later_states_of_a_large_task_are_bounded_closely(seed):
     problem = dataclasses.replace(random_problem(seed, 9, seed % 3), resolution=1e-4)
     search = TaskSearch(CUTS)
     search.learn(problem, CUTS.solve(problem))
     for later in random_walk(problem, seed):
-        plan, exact = search.plan(later), {r.visit: r.cost for r in regrets(later, ExactSolver())}
+        plan, best = search.plan(later), ExactSolver().solve(later)
         check(later, plan)
-        shortest = min(exact.values())
-        assert plan.lower_bound - 2e-3 <= shortest <= plan.cost + 2e-3
-        least, unit = search.least(later), later.integers.unit
-        assert least.keys() == exact.keys()
-        assert all(least[visit] * unit <= exact[visit] + 2e-3 for visit in exact)
+        assert 0.85 * best.cost < plan.lower_bound <= best.cost + 2e-3 <= plan.cost + 4e-3
 
 
-def test_the_bound_of_a_plan_that_is_followed_stays_as_close_as_its_cuts_were(monkeypatch):
-    monkeypatch.setattr(task_search, "WIDE", 1.0)  # no cuts are added
-    problem = dataclasses.replace(random_problem(2, 13, 1), resolution=1e-4)
-    plan, search = CUTS.solve(problem), TaskSearch(CUTS)
-    search.learn(problem, plan)
-    gap = plan.cost - plan.certificate.root * plan.certificate.unit
-    left, cuts = plan.cost, 0
-    for visit in plan.visits[:-6]:
-        left -= problem.distances[problem.start, problem.location(visit)]
-        problem = after(problem, visit)
-        later = search.plan(problem)
-        assert left - gap - 0.02 * plan.cost < later.lower_bound < left + 1e-3
-        cuts += len(later.certificate.cuts)
-    assert cuts > 0
-
-
-def test_a_stopped_search_without_known_cuts_has_a_certificate_all_the_same():
+def test_a_stopped_search_for_a_large_task_has_a_certificate_all_the_same():
     problem, stop = dataclasses.replace(random_problem(3, 9, 1), resolution=1e-4), threading.Event()
     stop.set()
     search = TaskSearch(CUTS)
     plan = search.plan(problem, limit=SolveLimit(stop=stop))
     check(problem, plan)
-    assert plan.certificate.root == 0
-    assert set(search.least(problem, SolveLimit(stop=stop)).values()) == {0}
-    TaskSearch(CUTS).learn(problem, plan)
-
-
-def test_a_task_without_known_cuts_finds_some():
-    problem = dataclasses.replace(random_problem(3, 9, 1), resolution=1e-4)
-    plan, best = TaskSearch(CUTS).plan(problem), ExactSolver().solve(problem)
-    check(problem, plan)
-    assert 0.95 * best.cost < plan.lower_bound <= best.cost + 1e-3 <= plan.cost + 2e-3
+    assert plan.certificate.proof is Proof.RELAXATION
 
 
 def test_a_replan_for_many_objects_does_not_start_from_scratch(monkeypatch):
