@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.geometry import MultiPolygon, Polygon
 
 from planner.errors import NavMeshError, NotNavigableError
-from planner.grid import GridFrame
 
 TOLERANCE = 1e-4  # maximum depth to which a path may cut into an inflated obstacle, in metres
 SNAP_CLEARANCE = 1e-6  # distance of snapped points from the boundary in metres, to allow for rounding errors
@@ -29,14 +28,14 @@ class NavMesh:
     Attributes:
         bounds: (x_min, y_min, x_max, y_max) in metres.
         agent_radius: Distance by which obstacles are inflated, in metres.
-        frame: Position and size of the grid.
+        resolution: Side length of a grid cell in metres.
         islands: Connected polygons of free space, largest first.
         solid: Inflated obstacles shrunk by `TOLERANCE`. Paths may not touch them.
     """
 
     bounds: tuple[float, float, float, float]
     agent_radius: float
-    frame: GridFrame
+    resolution: float
     islands: tuple[Polygon, ...]
     solid: MultiPolygon
     _inner: NDArray[np.object_] = field(repr=False)  # islands shrunk by `SNAP_CLEARANCE`
@@ -79,24 +78,35 @@ class NavMesh:
         outer = shapely.buffer(islands, 0.5 * TOLERANCE, join_style="mitre")
         shapely.prepare(islands)
         shapely.prepare(outer)
-        frame = GridFrame.covering(box.bounds, resolution)
         solid = MultiPolygon(_polygons(shapely.buffer(inflated, -TOLERANCE, join_style="mitre")))
-        return cls(box.bounds, float(agent_radius), frame, tuple(islands), solid, inner, outer)
+        return cls(box.bounds, float(agent_radius), float(resolution), tuple(islands), solid, inner, outer)
 
     @property
     def area(self) -> float:
         """Area of the largest island in square metres."""
         return float(self.islands[0].area)
 
+    @property
+    def cell_centres(self) -> NDArray[np.float64]:
+        """The centres of the grid cells in metres, shape (rows, columns, 2).
+
+        The centre in row r and column c is x_min + (c + 0.5) * resolution, y_min + (r + 0.5) * resolution.
+        """
+        x, y = (
+            low
+            + (np.arange(max(1, math.ceil((high - low) / self.resolution - 1e-9))) + 0.5) * self.resolution
+            for low, high in zip(self.bounds[:2], self.bounds[2:], strict=True)
+        )
+        return np.stack(np.meshgrid(x, y), axis=-1)
+
     @cached_property
     def topdown_map(self) -> NDArray[np.int32]:
         """The island index at the centre of each grid cell: 0 for the largest island, -1 outside all islands.
 
-        The array is read-only and has the shape (rows, columns). The cell in row r and column c has its
-        centre at x_min + (c + 0.5) * resolution, y_min + (r + 0.5) * resolution. Row 0 has the smallest y, so
-        draw the map with the origin at the lower left. `frame.centres()` returns all centres.
+        The array is read-only and has the shape (rows, columns). Row 0 has the smallest y, so draw the map with the
+        origin at the lower left. `cell_centres` contains all centres.
         """
-        islands = _islands_at(self._outer, self.frame.centres())
+        islands = _islands_at(self._outer, self.cell_centres)
         islands.setflags(write=False)
         return islands
 

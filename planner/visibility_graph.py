@@ -16,7 +16,6 @@ from scipy.sparse.csgraph import dijkstra
 from shapely.geometry.polygon import orient
 
 from mjsim.support.kernels import kernel
-from planner.grid import SegmentGrid, is_visible
 from planner.navmesh import TOLERANCE, NavMesh
 
 REPEATED = 1e-9  # distance below which two corners of a path are merged, in metres
@@ -36,7 +35,7 @@ class VisibilityGraph:
     # x and y of each reflex vertex, and of its two neighbours on the ring, in metres, shape (v, 6)
     vertices: NDArray[np.float64]
     island: NDArray[np.int64]  # island of each vertex, shape (v,)
-    walls: SegmentGrid  # edges of the obstacles
+    walls: NDArray[np.float64]  # edges of the obstacles, as x and y of both ends in metres, shape (e, 4)
     edges: csr_array  # distances between vertices that are visible from each other in metres, shape (v, v)
 
     @classmethod
@@ -44,7 +43,7 @@ class VisibilityGraph:
         found = [_reflex_vertices(island) for island in navmesh.islands]
         vertices = np.concatenate([np.empty((0, 6)), *found])
         island = np.repeat(np.arange(len(found)), [len(f) for f in found])
-        walls = SegmentGrid.build(navmesh.frame, _edges(navmesh.solid))
+        walls = _edges(navmesh.solid)
         rows, columns = vertex_pairs(vertices, island, walls, TOLERANCE)
         weights = np.hypot(*(vertices[rows, :2] - vertices[columns, :2]).T)
         count = len(vertices)
@@ -126,6 +125,32 @@ def _edges(geometry: shapely.Geometry) -> NDArray[np.float64]:
 
 
 @kernel
+def is_visible(ax: float, ay: float, bx: float, by: float, walls: NDArray[np.float64]) -> bool:
+    """Return True if the line from a to b does not touch a wall."""
+    for k in range(walls.shape[0]):  # noqa: SIM110 - numba compiles no generators
+        if touch(ax, ay, bx, by, walls[k]):
+            return False
+    return True
+
+
+@kernel
+def touch(ax: float, ay: float, bx: float, by: float, wall: NDArray[np.float64]) -> bool:
+    """Return True if the line segment from a to b touches a wall, end points included."""
+    cx, cy, dx, dy = wall[0], wall[1], wall[2], wall[3]
+    if max(cx, dx) < min(ax, bx) or min(cx, dx) > max(ax, bx):
+        return False
+    if max(cy, dy) < min(ay, by) or min(cy, dy) > max(ay, by):
+        return False
+    side_c = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    side_d = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
+    if (side_c > 0.0 and side_d > 0.0) or (side_c < 0.0 and side_d < 0.0):
+        return False
+    side_a = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
+    side_b = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
+    return not ((side_a > 0.0 and side_b > 0.0) or (side_a < 0.0 and side_b < 0.0))
+
+
+@kernel
 def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) -> bool:
     ux, uy = vertex[0] - x, vertex[1] - y
     before = ux * (vertex[3] - vertex[1]) - uy * (vertex[2] - vertex[0])
@@ -137,7 +162,7 @@ def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) ->
 
 @kernel
 def vertex_pairs(
-    vertices: NDArray[np.float64], island: NDArray[np.int64], walls: SegmentGrid, slack: float
+    vertices: NDArray[np.float64], island: NDArray[np.int64], walls: NDArray[np.float64], slack: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the indices i < j of vertices that are connected by an unobstructed line, tangent at both ends.
 
@@ -163,7 +188,7 @@ def visible_vertices(
     y: float,
     vertices: NDArray[np.float64],
     usable: NDArray[np.bool_],
-    walls: SegmentGrid,
+    walls: NDArray[np.float64],
     slack: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Return the usable vertices visible from a point along tangents, and their distances in metres."""
@@ -178,7 +203,7 @@ def visible_vertices(
 
 @kernel
 def direct_distances(
-    a: NDArray[np.float64], b: NDArray[np.float64], walls: SegmentGrid
+    a: NDArray[np.float64], b: NDArray[np.float64], walls: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the straight-line distances from points `a` to points `b`, infinite if blocked, shape (s, t)."""
     result = np.full((a.shape[0], b.shape[0]), np.inf)

@@ -34,7 +34,7 @@ def test_area_is_what_is_left_of_the_floor():
     mesh = NavMesh.build([box(1, 1, 2, 3)], BOUNDS, agent_radius=RADIUS)
     inflated = 1 * 2 + 2 * (1 + 2) * RADIUS + math.pi * RADIUS**2
     assert mesh.area == pytest.approx(16 - inflated, rel=1e-3)
-    assert (mesh.topdown_map == 0).sum() * mesh.frame.resolution**2 == pytest.approx(mesh.area, rel=0.01)
+    assert (mesh.topdown_map == 0).sum() * mesh.resolution**2 == pytest.approx(mesh.area, rel=0.01)
 
 
 def test_a_closed_room_is_an_island_of_its_own():
@@ -76,7 +76,7 @@ def test_nothing_navigable_is_nearer_than_the_snapped_point(field, point):
     mesh = NavMesh.build(field, BOUNDS, agent_radius=0.2, resolution=0.1)
     snapped = mesh.snap(point, max_distance=math.inf)
     assert mesh.island_of(snapped) == 0
-    centres = mesh.frame.centres()[mesh.topdown_map == 0]
+    centres = mesh.cell_centres[mesh.topdown_map == 0]
     if len(centres):
         nearest = np.hypot(*(centres - point).T).min()
         assert math.dist(snapped, point) <= nearest + 2e-4
@@ -108,7 +108,7 @@ def test_points_and_the_map_are_on_the_islands_of_the_polygons(field, seed, reso
             snapped = mesh.snap(point, island=island)
             inside = shapely.intersects_xy(mesh.islands[island], *point)
             assert np.array_equal(snapped, point) if inside else math.dist(snapped, point) < TOLERANCE
-    centres = mesh.frame.centres()
+    centres = mesh.cell_centres
     expected, unclear = island_by_polygons(mesh, centres.reshape(-1, 2))
     assert np.array_equal(mesh.topdown_map.ravel()[~unclear], expected[~unclear])
 

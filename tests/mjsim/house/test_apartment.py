@@ -76,9 +76,9 @@ def test_every_room_is_on_the_floor_of_one_person(house, only, radius, area):
             spec.delete(body)
     plan = footprint(spec.compile())
     mesh = NavMesh.build(plan.obstacles, plan.bounds, agent_radius=radius)
-    walkable = mesh.frame.centres()[mesh.topdown_map == 0]
+    walkable = mesh.cell_centres[mesh.topdown_map == 0]
     cells = Counter(house.rooms.room_at(point) for point in walkable)
-    assert all(cells[room] * mesh.frame.resolution**2 > area for room in ROOMS), cells
+    assert all(cells[room] * mesh.resolution**2 > area for room in ROOMS), cells
 
 
 def test_a_person_can_stand_right_in_front_of_every_receptacle(house):
