@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +15,7 @@ from planner.integer_distances import TOLERANCE, IntegerDistances, integer_dista
 from planner.plan import Certificate, Plan, Status, Visit, VisitKind
 
 MIN_LARGEST, MAX_LARGEST = 1e-250, 1e250  # limits of the largest distance that prevent overflow and underflow
+SAME = 1e-6  # difference up to which two distances or tour lengths count as equal, in metres
 ASYMMETRY = 1e-12  # relative difference between d[i, j] and d[j, i] that is accepted as a rounding error
 
 
@@ -199,6 +200,40 @@ def tour_length(
     """
     stops = problem.stops(visits)
     return float((problem.distances if distances is None else distances)[stops[:-1], stops[1:]].sum())
+
+
+def after(problem: RoutingProblem, visit: Visit) -> RoutingProblem:
+    """Return the problem that remains after a visit. Raises ProblemError if the visit is not possible."""
+    if visit not in possible_next(problem):
+        raise ProblemError(f"{visit} is not possible now; choose one of possible_next")
+    shipments, onboard = list(problem.shipments), list(problem.onboard)
+    names, number = list(problem.names), problem.number[visit.object]
+    name = names.pop(number)
+    if visit.kind is VisitKind.PICK:
+        onboard.append(shipments.pop(number).delivery)
+        names.append(name)
+    else:
+        onboard.pop(number - len(shipments))
+    start = problem.location(visit)
+    return replace(
+        problem, start=start, shipments=tuple(shipments), onboard=tuple(onboard), names=tuple(names)
+    )
+
+
+def is_for(plan: Plan, problem: RoutingProblem) -> bool:
+    """Return True if a plan was made for a problem."""
+    if set(plan.visits) != set(problem.visits):
+        return False
+    return abs(tour_length(problem, plan.visits) - plan.cost) <= SAME
+
+
+def same_problem(one: RoutingProblem, other: RoutingProblem) -> bool:
+    """Return True if two problems have the same objects, the same places and the same start."""
+    if set(one.visits) != set(other.visits) or one.capacity != other.capacity:
+        return False
+    here, there = (problem.stops(one.visits) for problem in (one, other))
+    first, second = one.distances[np.ix_(here, here)], other.distances[np.ix_(there, there)]
+    return np.allclose(first, second, rtol=0.0, atol=SAME)
 
 
 def spanning_bound(problem: RoutingProblem) -> int:

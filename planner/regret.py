@@ -12,11 +12,10 @@ from planner.exact.task_search import TaskSearch
 from planner.exact.task_table import TaskTable
 from planner.geodesics import Geodesics
 from planner.plan import Plan, Status, Visit
-from planner.problem import RoutingProblem, possible_next, tour_length
+from planner.problem import RoutingProblem, after, is_for, possible_next, same_problem, tour_length
 from planner.route import TaskState
 from planner.solvers import Deadline, SolveLimit, Solver
 from planner.task_problems import TaskProblems
-from planner.tour_bounds import TourBounds, after, is_for
 
 RADIUS = 1.0  # default limit up to which regrets are computed exactly, in metres
 MIN_RADIUS = 0.1  # smallest radius of a pass in metres
@@ -68,8 +67,10 @@ class RegretEvaluator:
         self._table = TaskTable(self._solver)
         self._limit, self._radius = limit, radius
         self._search = search or TaskSearch(self._solver, limit)
-        self._tours = TourBounds(self._solver, self._search, self._problems.walk)
         self._last: tuple[TaskState, dict[Visit, Regret]] | None = None
+        self._planned: tuple[RoutingProblem, Plan] | None = (
+            None  # last problem of `bounds`, and the plan for it
+        )
 
     def copy(self) -> "RegretEvaluator":
         """Return a copy of this evaluator with the same limit, but with a budget of its own."""
@@ -121,7 +122,7 @@ class RegretEvaluator:
     def bounds(self, state: TaskState, visit: Visit, plan: Plan | None = None) -> RegretBounds | None:
         """Return bounds on the regret of a visit, or None if the visit is not possible.
 
-        The arguments and errors are those of `of`. What a call finds out is kept for the state after the visit.
+        The arguments and errors are those of `of`.
         """
         if self._last is not None and same_state(self._last[0], state):
             known = self._last[1].get(visit)
@@ -134,20 +135,34 @@ class RegretEvaluator:
         if costs is not None:
             exact = next(regret.regret for regret in _ranked(problem, *costs) if regret.visit == visit)
             return RegretBounds(exact, exact, exact)
-        before = self._tours.before(state, problem, plan, self._limit)
-        rest = self._tours.after(state, problem, before, visit, self._limit)
+        before = self._plan(problem, plan)
         leg = float(problem.distances[problem.start, problem.location(visit)])
-        exact = max(0.0, leg + rest.cost - before.cost)
-        if before.status is rest.status is Status.OPTIMAL:
+        if before.visits[0] == visit:
+            cost, lower, proven = before.cost, before.lower_bound, before.status is Status.OPTIMAL
+        else:
+            rest = self._solve(after(problem, visit))
+            cost, lower = leg + rest.cost, leg + rest.lower_bound
+            proven = before.status is rest.status is Status.OPTIMAL
+        exact = max(0.0, cost - before.cost)
+        if proven:
             return RegretBounds(exact, exact, exact)
-        lower = max(0.0, leg + rest.lower_bound - min(before.cost, leg + rest.cost))
-        return RegretBounds(lower, max(lower, leg + rest.cost - before.lower_bound), None)
+        lower = max(0.0, lower - min(before.cost, cost))
+        return RegretBounds(lower, max(lower, cost - before.lower_bound), None)
 
-    def follow(self, state: TaskState, visit: Visit, plan: Plan) -> None:
-        """Keep the rest of a proven plan for the state after a visit that the plan suggested."""
-        problem = self._problems.problem(state)
-        if self._solver.applies(problem) and not self._table.fits(problem):
-            self._tours.follow(state, problem, visit, plan)
+    def _plan(self, problem: RoutingProblem, plan: Plan | None) -> Plan:
+        """Return a plan for a problem, which is `plan` itself if it was made for this problem."""
+        if self._planned is None or not same_problem(self._planned[0], problem):
+            if plan is not None and is_for(plan, problem):
+                self._search.learn(problem, plan)
+            else:
+                plan = self._solve(problem)
+            self._planned = problem, plan
+        return self._planned[1]
+
+    def _solve(self, problem: RoutingProblem) -> Plan:
+        if self._solver.applies(problem):
+            return self._search.plan(problem, limit=self._limit)
+        return self._solver.solve(problem, limit=self._limit)
 
 
 def same_state(one: TaskState, other: TaskState) -> bool:

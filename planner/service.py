@@ -203,16 +203,6 @@ class Planner:
         self._late.append((label, self._judges.submit(self._judge.bounds, state, visit, plan)))
         return None
 
-    def follow(self, visit: Visit) -> None:
-        """Record a completed visit that a proven plan suggested, so that the rest of the plan is kept as proven."""
-        if self._task is None:
-            return
-        state, plan = self._task
-        if self._judges is None:
-            self._judge.follow(state, visit, plan)
-        else:
-            self._judges.submit(self._judge.follow, state, visit, plan)
-
     def finish(self) -> list[tuple[Any, RegretBounds | None]]:
         """End the task, and return the label and the regret of each visit that `judge` has postponed.
 

@@ -70,10 +70,6 @@ class TaskProblems:
         first = self._geodesics.distances_from(self._snap(state.position), places[:1])[0]
         return float(first + self._between(places)[order[:-1], order[1:]].sum())
 
-    def walk(self, start: XY, goal: XY) -> float:
-        """Return the length in metres of the shortest walk between two positions."""
-        return float(self._geodesics.distances_from(self._snap(start), [self._snap(goal)])[0])
-
     def _snap(self, position: XY, max_distance: float = math.inf) -> XY:
         x, y = self._geodesics.navmesh.snap(position, max_distance)
         return float(x), float(y)

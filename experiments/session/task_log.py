@@ -123,8 +123,6 @@ class TaskLog:
         for visit, keys in names.items():
             if proven and visit == suggested:
                 fields |= _regret_fields(keys, RegretBounds(0.0, 0.0, 0.0))
-                if visit == made:
-                    self._planner.follow(visit)
             else:
                 fields |= _regret_fields(keys, self._planner.judge(visit, (number, keys)))
         return fields

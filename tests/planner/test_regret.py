@@ -10,10 +10,9 @@ from planning_cases import optimum, random_problem
 
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
-from planner.problem import possible_next
+from planner.problem import after, possible_next
 from planner.regret import regrets
 from planner.solvers import SolveLimit, solver
-from planner.tour_bounds import after
 
 seeds = st.integers(0, 2**32 - 1)
 TABLE, PASS = ExactSolver(), ExactSolver(table_bytes=0)

@@ -151,35 +151,3 @@ def test_all_searches_of_a_task_share_one_budget(geodesics):
     found = evaluator.bounds(task.state, possible(task)[0])
     assert search.left == 0
     assert found.lower <= found.upper
-
-
-def test_a_proven_plan_that_is_followed_costs_no_search(geodesics):
-    """The rest of the plan is the proven plan of the next state if the person stands where the plan assumes."""
-    task, search = Task(geodesics, 12, 3), TaskSearch(SEARCH)
-    plan = SEARCH.solve(TaskProblems(geodesics).problem(task.state))
-    evaluator = RegretEvaluator(geodesics, solver=SEARCH, search=search)
-    for visit in plan.visits[:6]:
-        evaluator.follow(task.state, visit, plan)
-        task.do(*visit)
-    assert evaluator.bounds(task.state, plan.visits[6], plan).exact == pytest.approx(0.0, abs=1e-9)
-    assert search.left == TaskSearch(SEARCH).left
-
-
-def test_a_followed_plan_bounds_the_regret_of_a_later_deviation(geodesics):
-    """Without any search, the bounds are those of the plan, less the distance to where the plan assumes the person."""
-    task, exact = Task(geodesics, 13, 5), RegretEvaluator(geodesics)
-    plan = SEARCH.solve(TaskProblems(geodesics).problem(task.state))
-    apart = []
-    for follows in (True, False):
-        task, search = Task(geodesics, 13, 5), TaskSearch(SEARCH, SolveLimit(work=1))
-        evaluator = RegretEvaluator(geodesics, solver=SEARCH, search=search)
-        for visit in plan.visits[:4]:
-            if follows:
-                evaluator.follow(task.state, visit, plan)
-            task.do(*visit)
-        x, y = task.position
-        task.position = (x + 0.05, y)
-        found = evaluator.bounds(task.state, possible(task)[-1], plan)
-        assert found.lower - 3e-3 <= exact.of(task.state, possible(task)[-1]) <= found.upper + 3e-3
-        apart.append(found.upper - found.lower)
-    assert apart[0] < apart[1]

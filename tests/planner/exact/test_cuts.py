@@ -26,12 +26,11 @@ from planner.exact.solver import ExactSolver
 from planner.exact.table import Solution
 from planner.exact.task_search import TaskSearch
 from planner.plan import Certificate, Plan, Proof, Status, VisitKind
-from planner.problem import make_plan, possible_next, tour_length
+from planner.problem import after, make_plan, possible_next, tour_length
 from planner.problem_json import claim_from_json, claim_to_json
 from planner.solver_source import SolverSource
 from planner.solvers import NEVER, Deadline, SolveLimit, solver
 from planner.task_problems import TaskProblems
-from planner.tour_bounds import after
 
 CUTS = ExactSolver(table_bytes=0, most_searched=0)
 WORK = 60_000_000
