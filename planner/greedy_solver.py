@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from planner.plan import Certificate, Plan, Proof, Visit
-from planner.problem import RoutingProblem, make_plan, possible_next, spanning_bound
+from planner.problem import RoutingProblem, make_plan, possible_next, spanning_bound, tour_length
 from planner.solvers import SolveLimit
 
 
@@ -34,7 +34,10 @@ def first_plan(problem: RoutingProblem) -> Plan:
 def _plan(problem: RoutingProblem, bound: int) -> Plan:
     started, integers = time.perf_counter(), problem.integers
     certificate = Certificate(Proof.SPANNING_TREE, integers.unit, bound)
-    return make_plan(problem, integers.legs, nearest_first(problem), bound, started, certificate)
+    visits = nearest_first(problem)
+    return make_plan(
+        problem, visits, tour_length(problem, visits, integers.legs), bound, started, certificate
+    )
 
 
 def nearest_first(problem: RoutingProblem) -> list[Visit]:

@@ -11,7 +11,7 @@ from ortools.constraint_solver import pywrapcp, routing_enums_pb2
 
 from planner.greedy_solver import GreedySolver, nearest_first
 from planner.plan import Certificate, Plan, Proof, Visit
-from planner.problem import RoutingProblem, make_plan, possible_next, spanning_bound
+from planner.problem import RoutingProblem, make_plan, possible_next, spanning_bound, tour_length
 from planner.solvers import SolveLimit
 
 FIRST_SOLUTIONS = (1, 10)  # solution limits of the first two searches in `improve`
@@ -46,7 +46,7 @@ class OrToolsSolver:
             bound, proof = spanning_bound(problem), Proof.SPANNING_TREE
             visits = _search(problem, legs, _with_budget(limit), started)
         certificate = Certificate(proof, problem.integers.unit, bound)
-        return make_plan(problem, legs, visits, bound, started, certificate)
+        return make_plan(problem, visits, tour_length(problem, visits, legs), bound, started, certificate)
 
     def improve(
         self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None

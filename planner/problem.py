@@ -250,22 +250,22 @@ def spanning_bound(problem: RoutingProblem) -> int:
 
 def make_plan(
     problem: RoutingProblem,
-    metric: NDArray[np.int64],
     visits: Sequence[Visit],
+    length: float,
     bound: int,
     started: float,
     certificate: Certificate,
 ) -> Plan:
     """Create a plan from a tour that was found with integer distances.
 
-    `metric` is the matrix of integer distances, of shape (k, k). `bound` is a lower bound on tours with these
-    distances. `started` is the value of `time.perf_counter()` when the solver started. The plan's lower bound
-    also holds for the original distances. The plan is OPTIMAL if the tour is as short as the bound, both in
-    integer distances and, within the problem's tolerance, in original distances.
+    `length` is the length of the tour in units, and `bound` is a lower bound on such lengths. `started` is the value of
+    `time.perf_counter()` when the solver started. The plan's lower bound also holds for the original distances. The
+    plan is OPTIMAL if the tour is as short as the bound, both in integer distances and, within the problem's tolerance,
+    in original distances.
     """
     integers, cost = problem.integers, tour_length(problem, visits)
     lower = certificate.unit * (bound - integers.rounding * len(visits))  # a leg may have been rounded up
-    met = tour_length(problem, visits, metric) <= bound + integers.tie
+    met = length <= bound + integers.tie
     rounding = (problem.resolution or 0.0) * len(visits) / 2
     optimal = met and cost - lower <= problem.tolerance(cost) + rounding
     status = Status.OPTIMAL if optimal else Status.FEASIBLE

@@ -138,7 +138,8 @@ class SolverSource(PlanSource):
         if new is None:  # the participant has deviated from this plan, so search again
             self._show(self._new_search(state, route), rest)
             return None
-        if self.problems.length(state, new) < self.problems.length(state, rest) - TIE:
+        problem = self.problems.problem(state)
+        if tour_length(problem, new) < tour_length(problem, rest) - TIE:
             search.shown = best.visits
             return self._follow(state, new, best)
         bounded = search.bounded(best)

@@ -1,7 +1,6 @@
 """Create routing problems for the states of a task, with positions snapped to the navmesh."""
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,20 +54,6 @@ class TaskProblems:
     def check(self, state: TaskState) -> None:
         """Raise UnreachableError if objects cannot be fetched or delivered. The error lists their names."""
         self._places(state)
-
-    def length(self, state: TaskState, visits: Sequence[Visit]) -> float:
-        """Return the length in metres of an open tour that starts at the person's position.
-
-        Raises UnreachableError if objects cannot be fetched or delivered.
-        """
-        at = self._places(state)
-        stops = [at[visit] for visit in visits]
-        if not stops:
-            return 0.0
-        places = list(dict.fromkeys(stops))
-        order = [places.index(stop) for stop in stops]
-        first = self._geodesics.distances_from(self._snap(state.position), places[:1])[0]
-        return float(first + self._between(places)[order[:-1], order[1:]].sum())
 
     def _snap(self, position: XY, max_distance: float = math.inf) -> XY:
         x, y = self._geodesics.navmesh.snap(position, max_distance)

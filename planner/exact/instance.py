@@ -21,7 +21,6 @@ class Instance(NamedTuple):
 
     between: NDArray[np.int64]  # distances between objects, shape (n, n); `FAR` on the diagonal
     to_bin: NDArray[np.int64]  # distances from objects to bins, shape (n, m)
-    from_bin: NDArray[np.int64]  # distances from bins to objects, shape (m, n)
     bins: NDArray[np.int64]  # distances between bins, shape (m, m)
     home: NDArray[np.int64]  # bin of each object, shape (n,)
     root: NDArray[np.int64]  # distances from the root to objects, shape (n,)
@@ -52,7 +51,6 @@ def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instanc
     return Instance(
         between=between,
         to_bin=block(pickups, places),
-        from_bin=block(places, pickups),
         bins=block(places, places),
         home=np.array([index[s.delivery] for s in problem.shipments], dtype=np.int64),
         root=root,

@@ -44,7 +44,7 @@ def moves_of(inst: Instance) -> Moves:
     held[bins * (m + 1)] = NOTHING
     busy = np.flatnonzero(held != NOTHING)
     hand, home = held[busy, None], inst.home
-    to_object = np.concatenate([np.repeat(inst.from_bin, m, axis=0), inst.between, inst.root[None]])
+    to_object = np.concatenate([np.repeat(inst.to_bin.T, m, axis=0), inst.between, inst.root[None]])
     to_bin = np.concatenate([np.repeat(inst.bins, m, axis=0), inst.to_bin, inst.root_bin[None]])
     end, length = np.full((root + 1, n + 1, 2), NOWHERE), np.zeros((root + 1, n + 1, 2), np.int64)
     end[:, :n, 0], length[:, :n] = m * m + objects, to_object[..., None]

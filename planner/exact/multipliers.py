@@ -20,8 +20,8 @@ MOMENTUM = 0.8
 FIRST_STEPS, FIRST_STEP_SIZES = 150, (1.0, 0.02)
 MAX_STEPS, MIN_STEPS, STEP_SIZES = 30, 4, (0.2, 0.03)
 STEP_ROWS = 60_000  # approximate number of rows that are filled to fit a large table
-SLICE = 1 << 13  # number of rows filled between two checks of the deadline, which takes about 3 ms
-STEP, ROW, BEST = range(3)  # indices into `Ascent.progress`
+SLICE = 1 << 13  # least number of rows filled between two checks of the deadline, which takes about 3 ms
+STEP, BEST = range(2)  # indices into `Ascent.progress`
 
 
 class Ascent(NamedTuple):
@@ -32,7 +32,7 @@ class Ascent(NamedTuple):
     violation: NDArray[np.float64]  # average violation, as in `Bound`, shape (n,)
     best: NDArray[np.int64]  # multipliers with the best bound, shape (n,)
     sizes: NDArray[np.float64]  # length of each step relative to the gap, shape (steps,)
-    progress: NDArray[np.int64]  # number of steps, number of rows filled for the next step, and best bound
+    progress: NDArray[np.int64]  # number of steps, and best bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ def fit(
         np.zeros(n),
         table.multipliers.copy(),
         np.array([first_size * (last_size / first_size) ** (k / steps) for k in range(steps)]),
-        np.array([0, 0, -1]),
+        np.array([0, -1]),
     )
     while not climb(instance, moves, table, ascent, upper, SLICE):
         if deadline.over():
@@ -174,63 +174,36 @@ def climb(inst: Instance, moves: Moves, table: CostTable, ascent: Ascent, upper:
     At the end, the table contains the best multipliers and the corresponding entries. The ascent is a single
     kernel because a return to Python after each table would require waiting for the interpreter lock.
     """
-    n, progress = inst.home.size, ascent.progress
+    n, steps, progress = inst.home.size, ascent.sizes.size, ascent.progress
     actions = np.empty(2 * n + 2, np.int64)
-    while True:
-        if progress[STEP] < ascent.sizes.size and progress[ROW] == 0:
-            for j in range(n):
-                price = np.rint(ascent.current[j])
-                table.multipliers[j] = int(min(max(price, -table.dearest), table.dearest))
-        last = min(table.bin.shape[0], progress[ROW] + rows)
-        fill_rows(inst, table, progress[ROW], last)
-        rows -= last - progress[ROW]
-        progress[ROW] = last
-        if last < table.bin.shape[0]:
-            return False
-        if progress[STEP] == ascent.sizes.size or not _stepped(
-            moves, table, ascent, upper - inst.tie, upper, actions
-        ):
-            return True
-        progress[ROW] = 0
-
-
-@kernel
-def _stepped(
-    moves: Moves, table: CostTable, ascent: Ascent, enough: int, upper: int, actions: NDArray[np.int64]
-) -> bool:
-    """Take a step with a filled table, or restore the best multipliers. Return False if nothing changed."""
-    progress, k = ascent.progress, ascent.progress[STEP]
-    total, count = walk(moves, table, table.bin.shape[0] - 1, actions)
-    value = total - table.multipliers.sum()
-    if value > progress[BEST]:
-        progress[BEST] = value
-        ascent.best[:] = table.multipliers
-    progress[STEP] += 1
-    ended = progress[BEST] >= enough or progress[STEP] == ascent.sizes.size
-    if not ended:
-        gap = 1.002 * upper - value
-        ended = not step(
-            actions[:count], gap, ascent.sizes[k], ascent.current, ascent.direction, ascent.violation
-        )
-    if ended:
-        progress[STEP] = ascent.sizes.size
-        if (table.multipliers == ascent.best).all():
-            return False
+    while rows > 0 and progress[STEP] < steps:
+        for j in range(n):
+            price = np.rint(ascent.current[j])
+            table.multipliers[j] = int(min(max(price, -table.dearest), table.dearest))
+        fill_rows(inst, table, 0, table.bin.shape[0])
+        rows -= table.bin.shape[0]
+        total, count = walk(moves, table, table.bin.shape[0] - 1, actions)
+        value = total - table.multipliers.sum()
+        if value > progress[BEST]:
+            progress[BEST] = value
+            ascent.best[:] = table.multipliers
+        size = ascent.sizes[progress[STEP]]
+        progress[STEP] += 1
+        ended = progress[BEST] >= upper - inst.tie or progress[STEP] == steps
+        if ended or not step(actions[:count], 1.002 * upper - value, size, ascent):
+            progress[STEP] = steps
+    if progress[STEP] < steps:
+        return False
+    if (table.multipliers != ascent.best).any():
         table.multipliers[:] = ascent.best
+        fill_rows(inst, table, 0, table.bin.shape[0])
     return True
 
 
 @kernel
-def step(
-    actions: NDArray[np.int64],
-    gap: float,
-    step_size: float,
-    current: NDArray[np.float64],
-    direction: NDArray[np.float64],
-    violation: NDArray[np.float64],
-) -> bool:
+def step(actions: NDArray[np.int64], gap: float, size: float, ascent: Ascent) -> bool:
     """Adjust the prices of objects that are not picked up exactly once. Return False if there are none."""
-    n = current.size
+    n = ascent.current.size
     surplus = np.full(n, -1.0)
     for action in actions:
         if action >= 0:
@@ -238,10 +211,10 @@ def step(
     norm = 0.0
     for j in range(n):  # loops compile much faster than slices
         norm += surplus[j] * surplus[j]
-        violation[j] = DECAY * violation[j] + abs(surplus[j])
+        ascent.violation[j] = DECAY * ascent.violation[j] + abs(surplus[j])
     if norm == 0.0:
         return False
     for j in range(n):
-        direction[j] = step_size * gap / norm * surplus[j] + MOMENTUM * direction[j]
-        current[j] += direction[j]
+        ascent.direction[j] = size * gap / norm * surplus[j] + MOMENTUM * ascent.direction[j]
+        ascent.current[j] += ascent.direction[j]
     return True

@@ -10,7 +10,7 @@ from planner.exact.instance import MAX_SEARCHED, Instance, make_instance, to_vis
 from planner.exact.table import BIN_ROWS, Solution, longest
 from planner.exact.warm_start import Start, WarmStart
 from planner.plan import Plan
-from planner.problem import RoutingProblem, make_plan
+from planner.problem import RoutingProblem, make_plan, tour_length
 from planner.solvers import Deadline, SolveLimit
 
 DEFAULT_WORK = 4_000_000  # default number of states to expand, which takes about 4 s including tables
@@ -118,7 +118,8 @@ class ExactSolver:
             found = self._search(instance, seed, limit, started, tabled=tabled, start=start)
         for solution in found:
             visits = to_visits(instance, solution.actions, problem.names[:n], problem.names[n:])
-            yield make_plan(problem, metric, visits, solution.bound, started, solution.certificate)
+            length = tour_length(problem, visits, metric)
+            yield make_plan(problem, visits, length, solution.bound, started, solution.certificate)
 
     def _search(
         self,

@@ -101,7 +101,7 @@ def new_table(inst: Instance, group: NDArray[np.int64]) -> CostTable:
 
 def longest(inst: Instance) -> int:
     """Return the length of the longest leg that does not begin at the root."""
-    leg = max(legs.max(initial=0) for legs in (inst.to_bin, inst.from_bin, inst.bins))
+    leg = max(legs.max(initial=0) for legs in (inst.to_bin, inst.bins))
     return int(np.where(inst.between < FAR, inst.between, 0).max(initial=leg))
 
 

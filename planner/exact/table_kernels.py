@@ -103,7 +103,7 @@ def legs_of(inst: Instance, table: CostTable) -> Legs:
         free = 0
         for j in range(n):
             to_bin[j * wide + b] = inst.to_bin[j, b]
-            from_bin[j * wide + b] = inst.from_bin[b, j] + table.multipliers[j]
+            from_bin[j * wide + b] = inst.to_bin[j, b] + table.multipliers[j]
             if inst.home[j] == b:
                 if free == 0:
                     bin_of[eights] = b

@@ -9,7 +9,7 @@ from planner.exact.solver import ExactSolver
 from planner.exact.table import Solution
 from planner.exact.warm_start import NOTHING_KNOWN, Start
 from planner.plan import Plan, Proof, Status
-from planner.problem import RoutingProblem, make_plan
+from planner.problem import RoutingProblem, make_plan, tour_length
 from planner.solvers import Deadline, SolveLimit
 
 TASK_WORK = 3_000_000  # default number of states that all searches of a task expand together
@@ -99,7 +99,8 @@ class TaskSearch:
             *_, best = improving_tours(instance, seed, work, end, passes, start, rows)
             self.spend(best.expanded)
         visits = to_visits(instance, best.actions, problem.names[:n], problem.names[n:])
-        plan = make_plan(problem, metric, visits, best.bound, started, best.certificate)
+        length = tour_length(problem, visits, metric)
+        plan = make_plan(problem, visits, length, best.bound, started, best.certificate)
         if work and plan.status is not Status.OPTIMAL:
             self._most = min(self._most, n - PAUSE)
         is_better = plan.status is Status.OPTIMAL or not self._warm.multipliers

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.exact.full_table import filled_table, follow
 from planner.exact.instance import FAR, Instance, make_instance, to_visits
-from planner.exact.moves import moves_of
+from planner.exact.moves import Moves, moves_of
 from planner.exact.table import CostTable
 from planner.plan import Certificate, Plan, Proof, Visit
 from planner.problem import RoutingProblem, make_plan
@@ -23,14 +22,13 @@ if TYPE_CHECKING:
 
 
 class TableState(NamedTuple):
-    """A task state as a row of a full table. The root of the instance is the person's current position."""
+    """A task state as a row of a full table. The moves begin at the person's current position."""
 
     instance: Instance
+    moves: Moves
     table: CostTable
     row: int
     names: tuple[str, ...]
-    metric: NDArray[np.int64]  # integer distances of the current problem, shape (k, k)
-    unit: float  # length of one unit in metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +51,10 @@ class TaskTable:
         state = self._at(problem)
         if state is None:
             return None
-        length, actions = follow(moves_of(state.instance), state.table, state.row)
+        length, actions = follow(state.moves, state.table, state.row)
         visits = to_visits(state.instance, actions, state.names, problem.names[len(problem.shipments) :])
-        certificate = Certificate(Proof.FULL_TABLE, state.unit, length)
-        return make_plan(problem, state.metric, visits, length, started, certificate)
+        certificate = Certificate(Proof.FULL_TABLE, state.instance.unit, length)
+        return make_plan(problem, visits, length, length, started, certificate)
 
     def costs(self, problem: RoutingProblem) -> tuple[dict[Visit, int], float] | None:
         """Return the cost of each possible next visit in units, and the unit in metres.
@@ -69,7 +67,7 @@ class TaskTable:
         if state is None:
             return None
         carried = problem.names[len(problem.shipments) :]
-        return costs_in(moves_of(state.instance), state.table, state.row, state.names, carried), state.unit
+        return costs_in(state.moves, state.table, state.row, state.names, carried), state.instance.unit
 
     def fits(self, problem: RoutingProblem) -> bool:
         """Return True if a full table can be used for a problem."""
@@ -102,29 +100,17 @@ def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
     here, there = (each.stops(problem.visits)[1:] for each in (problem, before))
     if not np.array_equal(problem.distances[np.ix_(here, here)], before.distances[np.ix_(there, there)]):
         return None  # an object was moved
-    metric = _metric(filled, problem, here, there)
+    # Lengths of shortest paths from the start to the location of each visit, via locations that the table contains
+    metric = before.integers.metric[np.ix_(there, there)]
+    direct = np.rint(problem.distances[problem.start, here] / before.integers.unit).astype(np.int64)
+    legs = (direct[:, None] + metric).min(axis=0, initial=FAR)
     bins = sorted({s.delivery for s in before.shipments} | set(before.onboard))
     bin_of = [bins.index(location) for location in there[n:]]
-    root, root_bin = (
-        np.full_like(filled.instance.root, FAR),
-        np.full_like(filled.instance.root_bin, FAR),
-    )
+    root, root_bin = np.full_like(filled.instance.root, FAR), np.full_like(filled.instance.root_bin, FAR)
     if len(problem.onboard) < problem.capacity:
-        root[left] = metric[problem.start, here[:n]]
-    root_bin[bin_of] = metric[problem.start, here[n:]]
-    instance = filled.instance._replace(
-        root=root, root_bin=root_bin, carried=np.array(bin_of[n:], dtype=np.int64)
-    )
+        root[left] = legs[:n]
+    root_bin[bin_of] = legs[n:]
+    carried = np.array(bin_of[n:], dtype=np.int64)
+    instance = filled.instance._replace(root=root, root_bin=root_bin, carried=carried)
     names = before.names[: len(before.shipments)]
-    return TableState(instance, filled.table, sum(1 << k for k in left), names, metric, before.integers.unit)
-
-
-def _metric(filled: _Filled, problem: RoutingProblem, here: list[int], there: list[int]) -> NDArray[np.int64]:
-    metric = np.zeros(problem.distances.shape, np.int64)
-    metric[np.ix_(here, here)] = filled.problem.integers.metric[np.ix_(there, there)]
-    if here and problem.start not in here:
-        direct = np.rint(problem.distances[problem.start, here] / filled.problem.integers.unit).astype(
-            np.int64
-        )
-        metric[problem.start, here] = (direct[:, None] + metric[np.ix_(here, here)]).min(axis=0)
-    return metric
+    return TableState(instance, moves_of(instance), filled.table, sum(1 << k for k in left), names)

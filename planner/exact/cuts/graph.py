@@ -44,7 +44,6 @@ def merged(instance: Instance) -> Instance:
     kept, place = np.unique(first, return_inverse=True)
     return instance._replace(
         to_bin=instance.to_bin[:, kept],
-        from_bin=instance.from_bin[kept],
         bins=instance.bins[np.ix_(kept, kept)],
         home=place[instance.home],
         root_bin=instance.root_bin[kept],
@@ -64,13 +63,13 @@ def state_graph(instance: Instance) -> StateGraph:
     apart = bins[:, None] != bins
     groups: list[tuple[Any, Any, Any]] = [
         (empty, end, 0),
-        (empty[:, None], alone, inst.from_bin),
+        (empty[:, None], alone, inst.to_bin.T),
         (alone, empty[home], inst.to_bin[objects, home]),
         (alone[:, None], second[:, home].T, inst.between),
         (second, at_bin[:, home].T, inst.to_bin),
         (second, at_bin[home], inst.to_bin[objects, home][:, None]),
         (at_bin, empty, np.where(apart, inst.bins, FAR)),
-        (at_bin[:, :, None], second.T, np.where(apart[:, :, None], inst.from_bin[:, None], FAR)),
+        (at_bin[:, :, None], second.T, np.where(apart[:, :, None], inst.to_bin.T[:, None], FAR)),
         *_first_arcs(inst, root, alone, second, at_bin),
     ]
     table = np.concatenate([np.stack(np.broadcast_arrays(*group)).reshape(3, -1) for group in groups], axis=1)

@@ -61,7 +61,8 @@ def cut_plan(problem):
         pass
     n = len(problem.shipments)
     visits = to_visits(instance, solution.actions, problem.names[:n], problem.names[n:])
-    return make_plan(problem, problem.integers.metric, visits, solution.bound, 0.0, solution.certificate)
+    length = tour_length(problem, visits, problem.integers.metric)
+    return make_plan(problem, visits, length, solution.bound, 0.0, solution.certificate)
 
 
 @pytest.mark.slow

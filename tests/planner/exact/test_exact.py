@@ -120,7 +120,7 @@ def dropped_every_way(instance, order):
         for b in set(held):
             rest = list(held)
             rest.remove(b)
-            go(t, instance.from_bin[b], instance.bins[b], tuple(rest), length + int(legs_bin[b]))
+            go(t, instance.to_bin[:, b], instance.bins[b], tuple(rest), length + int(legs_bin[b]))
         if t < n and len(held) < 2:
             i = order[t]
             home = int(instance.home[i])
