@@ -110,7 +110,9 @@ class Geodesics:
                 self._remembered.clear()
             graph = self._graph
             usable = graph.island == island
-            view = VisibleVertices(*visible_vertices(x, y, graph.vertices, usable, graph.walls, TOLERANCE))
+            view = VisibleVertices(
+                *visible_vertices(np.array((x, y) * 3), graph.vertices, usable, graph.walls, TOLERANCE)
+            )
             self._remembered[x, y] = view  # another thread may clear the cache, so do not read it again
         return view
 

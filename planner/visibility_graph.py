@@ -44,12 +44,13 @@ class VisibilityGraph:
         vertices = np.concatenate([np.empty((0, 6)), *found])
         island = np.repeat(np.arange(len(found)), [len(f) for f in found])
         walls = _edges(navmesh.solid)
-        rows, columns = vertex_pairs(vertices, island, walls, TOLERANCE)
-        weights = np.hypot(*(vertices[rows, :2] - vertices[columns, :2]).T)
-        count = len(vertices)
-        edges = csr_array(
-            (np.r_[weights, weights], (np.r_[rows, columns], np.r_[columns, rows])), shape=(count, count)
-        )
+        later = np.arange(len(vertices)) > np.arange(len(vertices))[:, None]
+        views = [
+            VisibleVertices(*visible_vertices(vertex, vertices, usable, walls, TOLERANCE))
+            for vertex, usable in zip(vertices, later & (island == island[:, None]), strict=True)
+        ]
+        seen = _with_rows(csr_array((0, len(vertices))), views)
+        edges = csr_array(seen + seen.T)
         return cls(vertices=vertices, island=island.astype(np.int64), walls=walls, edges=edges)
 
     def distances(
@@ -87,18 +88,22 @@ class VisibilityGraph:
 
         The points are nodes without entering edges, numbered after the vertices.
         """
-        edges, size = self.edges, len(self.vertices) + len(views)
-        starts = edges.indptr[-1] + np.cumsum([len(view.seen) for view in views], dtype=np.int32)
-        graph = csr_array(
-            (
-                np.concatenate([edges.data, *(view.lengths for view in views)]),
-                np.concatenate([edges.indices, *(view.seen for view in views)]),
-                np.concatenate([edges.indptr, starts]),
-            ),
-            shape=(size, size),
-        )
-        over, before = dijkstra(graph, indices=np.arange(len(self.vertices), size), return_predecessors=True)
+        graph = _with_rows(self.edges, views)
+        starts = np.arange(len(self.vertices), graph.shape[0])
+        over, before = dijkstra(graph, indices=starts, return_predecessors=True)
         return over, before
+
+
+def _with_rows(edges: csr_array, views: Sequence[VisibleVertices]) -> csr_array:
+    """Append a node with the edges to the visible vertices of each point."""
+    starts = edges.indptr[-1] + np.cumsum([len(view.seen) for view in views], dtype=np.int32)
+    parts = (
+        [edges.data, *(view.lengths for view in views)],
+        [edges.indices, *(view.seen for view in views)],
+        [edges.indptr, starts],
+    )
+    size = len(edges.indptr) - 1 + len(views)
+    return csr_array(tuple(map(np.concatenate, parts)), shape=(size, size))
 
 
 def _rings(geometry: shapely.Geometry) -> list[NDArray[np.float64]]:
@@ -161,41 +166,24 @@ def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) ->
 
 
 @kernel
-def vertex_pairs(
-    vertices: NDArray[np.float64], island: NDArray[np.int64], walls: NDArray[np.float64], slack: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the indices i < j of vertices that are connected by an unobstructed line, tangent at both ends.
-
-    `vertices` and `island` are those of `VisibilityGraph`. `slack` is the tolerance of the tangent test in metres.
-    """
-    rows, columns = [0], [0]
-    for i in range(vertices.shape[0]):
-        for j in range(i + 1, vertices.shape[0]):
-            if island[i] != island[j]:
-                continue
-            p, q = vertices[i], vertices[j]
-            if not (is_tangent(p[0], p[1], q, slack) and is_tangent(q[0], q[1], p, slack)):
-                continue
-            if is_visible(p[0], p[1], q[0], q[1], walls):
-                rows.append(i)
-                columns.append(j)
-    return np.array(rows[1:]), np.array(columns[1:])
-
-
-@kernel
 def visible_vertices(
-    x: float,
-    y: float,
+    corner: NDArray[np.float64],
     vertices: NDArray[np.float64],
     usable: NDArray[np.bool_],
     walls: NDArray[np.float64],
     slack: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Return the usable vertices visible from a point along tangents, and their distances in metres."""
+    """Return the usable vertices that are visible along tangents, and their distances in metres.
+
+    `corner` is a row of `vertices`. A point without neighbours has three times the same x and y.
+    """
+    x, y = corner[0], corner[1]
     found, lengths = [0], [0.0]
     for j in range(vertices.shape[0]):
         q = vertices[j]
-        if usable[j] and is_tangent(x, y, q, slack) and is_visible(x, y, q[0], q[1], walls):
+        if not usable[j] or not is_tangent(x, y, q, slack) or not is_tangent(q[0], q[1], corner, slack):
+            continue
+        if is_visible(x, y, q[0], q[1], walls):
             found.append(j)
             lengths.append(np.hypot(q[0] - x, q[1] - y))
     return np.array(found[1:]).astype(np.int32), np.array(lengths[1:])
