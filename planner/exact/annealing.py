@@ -5,9 +5,11 @@ from numpy.typing import NDArray
 
 from mjsim.support.kernels import inlined, kernel
 from planner.exact.instance import Instance
+from planner.exact.moves import NOTHING, NOWHERE, Moves
 from planner.exact.table import INFINITE
 from planner.solvers import NEVER, Deadline
 
+Ways = dict[int, tuple[int, list[int]]]  # length and actions of a shortest known way to each place
 SLICE = 10_000  # number of moves between two checks of the deadline, which takes about 15 ms
 
 
@@ -23,38 +25,6 @@ def uniform(state: NDArray[np.uint64]) -> float:
 
 
 @kernel
-def drops(m: int, held: int, other: int) -> tuple[tuple[int, int, int], ...]:
-    """Return up to four ways to place the objects in hand before the next pick.
-
-    Each way is (first bin, second bin, bin of the object that stays in hand). `held` and `other` are the bins
-    of the objects in hand. The value m, which is the number of bins, stands for no bin or no object.
-    """
-    never = (m, m, -1)
-    if held == m:
-        return (m, m, m), never, never, never
-    if other == held:
-        return (held, m, m), never, never, never
-    if other == m:
-        return (m, m, held), (held, m, m), never, never
-    return (other, m, held), (held, m, other), (other, held, m), (held, other, m)
-
-
-@kernel
-def length(inst: Instance, i: int, b: int, then: int, x: int) -> int:
-    """Return the length of the path from object i to bin b, bin `then` and object x. If i is -1, start at the root."""
-    m = inst.bins.shape[0]
-    if b == m:
-        if x < 0:
-            return 0
-        return int(inst.root[x] if i < 0 else inst.between[i, x])
-    total = int(inst.root_bin[b] if i < 0 else inst.to_bin[i, b])
-    if then < m:
-        total += inst.bins[b, then]
-        b = then
-    return total + (int(inst.to_bin[x, b]) if x >= 0 else 0)
-
-
-@kernel
 def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[np.int64]) -> int:
     """Return the length of the shortest tour with a given order of picks.
 
@@ -63,13 +33,8 @@ def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[
     """
     n, m = inst.to_bin.shape
     if start == 0:
-        x = order[0] if n else -1
         costs[0] = INFINITE
-        held = inst.carried[0] if inst.carried.size > 0 else m
-        other = inst.carried[1] if inst.carried.size > 1 else m
-        for b, then, rest in drops(m, held, other):
-            if rest >= 0:
-                costs[0, rest] = min(costs[0, rest], length(inst, -1, b, then, x))
+        _start(inst, order, costs[0])
         start = 1
     for t in range(start, n):
         _advance(inst, order[t - 1], order[t], costs[t - 1], costs[t])
@@ -77,6 +42,25 @@ def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[
         costs[n] = INFINITE
         costs[n, m] = _finish(inst, order[n - 1], costs[n - 1])
     return int(costs[n, m])
+
+
+@inlined
+def _start(inst: Instance, order: NDArray[np.int64], after: NDArray[np.int64]) -> None:
+    m, count = inst.bins.shape[0], inst.carried.size
+    x = order[0] if order.size else -1
+    for k in range(count):  # place this object first, and another one before the first pick or later
+        b, other = inst.carried[k], inst.carried[count - 1 - k]
+        leg = inst.to_bin[x, b] if x >= 0 else 0
+        if b == other:  # also if only one object is carried
+            after[m] = inst.root_bin[b] + leg
+        else:
+            after[other] = inst.root_bin[b] + leg
+            last = inst.to_bin[x, other] if x >= 0 else 0
+            after[m] = min(after[m], inst.root_bin[b] + inst.bins[b, other] + last)
+    if count < 2 and x >= 0:
+        after[inst.carried[0] if count else m] = inst.root[x]
+    elif count == 0:
+        after[m] = 0
 
 
 @inlined
@@ -107,42 +91,34 @@ def _finish(inst: Instance, i: int, before: NDArray[np.int64]) -> int:
     return int(best)
 
 
-@kernel
-def tour_actions(inst: Instance, order: NDArray[np.int64]) -> NDArray[np.int64]:
+def tour_actions(moves: Moves, order: NDArray[np.int64]) -> list[int]:
     """Return the actions of a shortest tour with a given order of picks, as defined in `Solution`."""
-    n, m = inst.to_bin.shape
-    costs = np.empty((n + 1, m + 1), np.int64)
-    decode(inst, order, 0, costs)
-    backwards = np.empty(3 * n + 2, np.int64)
-    count, state = 0, m
-    for t in range(n, -1, -1):
-        x = order[t] if t < n else -1
-        if t < n:
-            backwards[count] = x
-            count += 1
-        i = order[t - 1] if t else -1
-        found = False
-        for d in range(m + 1 if t else 1):
-            if t and costs[t - 1, d] >= INFINITE:
-                continue
-            if t:
-                before, held, other = costs[t - 1, d], inst.home[i], d
-            else:
-                before = 0
-                held = inst.carried[0] if inst.carried.size > 0 else m
-                other = inst.carried[1] if inst.carried.size > 1 else m
-            for b, then, rest in drops(m, held, other):
-                if not found and rest == state and before + length(inst, i, b, then, x) == costs[t, state]:
-                    found = True
-                    if then < m:
-                        backwards[count] = -1 - then
-                        count += 1
-                    if b < m:
-                        backwards[count] = -1 - b
-                        count += 1
-                    next_state = d
-        state = next_state
-    return backwards[:count][::-1].copy()
+    best: Ways = {len(moves.end) - 1: (0, [])}
+    for x in order.tolist():
+        _place(moves, best)
+        after: Ways = {}
+        for place in best:
+            _move(moves, best, place, x, after)
+        best = after
+    _place(moves, best)
+    return min(way for place, way in best.items() if moves.end[place, NOTHING, 0] == NOWHERE)[1]
+
+
+def _place(moves: Moves, best: Ways) -> None:
+    """Add the ways that place objects next. At the root, there can be two of them."""
+    for _ in range(2):
+        for place in list(best):
+            _move(moves, best, place, NOTHING, best)
+
+
+def _move(moves: Moves, best: Ways, place: int, x: int, after: Ways) -> None:
+    """Add the ways from a place that pick up object x or nothing, unless shorter ones are known."""
+    length, actions = best[place]
+    for end, leg in zip(moves.end[place, x].tolist(), moves.length[place, x].tolist(), strict=True):
+        if end != NOWHERE and (end not in after or length + leg < after[end][0]):
+            picked = [] if x == NOTHING else [x]
+            placed = [-1 - end // moves.bins] if end < moves.bins**2 else []
+            after[end] = length + leg, [*actions, *picked, *placed]
 
 
 @inlined

@@ -69,7 +69,7 @@ def _first_tour(
         length, order = anneal(instance, seed, WARM_MOVES, order, *WARM_TEMPERATURES)
         bound = warm_bound(instance, start, warm_rows)
     upper, lower, expanded = length, bound.root, 0
-    actions: list[int] = tour_actions(instance, order).tolist()
+    actions = tour_actions(bound.moves, order)
     if start is not None and work > 0 and len(instance.home) <= MAX_SEARCHED:
         narrow = beam_pass(bound, upper, WARM_WIDTH, work, NEVER)
         lower, expanded = max(lower, narrow.lower), narrow.expanded

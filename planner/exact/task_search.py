@@ -114,4 +114,4 @@ class TaskSearch:
         order = completed(instance, self._warm.indices(problem.names[: len(problem.shipments)]))
         length, order = anneal(instance, seed, MOVES, order, *TEMPERATURES)
         bound = grown(first_bound(instance, length), length, ROWS, end)
-        return Solution(tour_actions(instance, order).tolist(), min(bound.root, length), bound.certificate)
+        return Solution(tour_actions(bound.moves, order), min(bound.root, length), bound.certificate)

@@ -21,6 +21,7 @@ from planner.exact.cuts.graph import LONGEST, StateGraph, state_graph
 from planner.exact.cuts.root_bound import RootBound, root_bound
 from planner.exact.cuts.tours import walks
 from planner.exact.instance import Instance
+from planner.exact.moves import moves_of
 from planner.exact.table import INFINITE, Solution
 from planner.solvers import Deadline
 
@@ -65,6 +66,7 @@ class _Search:
 
     def __post_init__(self) -> None:
         self.graph: StateGraph = state_graph(self.instance)
+        self.moves = moves_of(self.instance)
         self.step = max(1, -(-int(self.graph.length.max()) // LONGEST))
         self.parts = PARTS if self.step == 1 else 1
         self.upper, self.lower, self.actions = INFINITE, self.first.bound, self.first.actions
@@ -172,4 +174,4 @@ class _Search:
     def _offer(self, order: NDArray[np.int64]) -> None:
         length = tour_units(self.instance, order)
         if length < self.upper:
-            self.upper, self.actions = length, tour_actions(self.instance, order).tolist()
+            self.upper, self.actions = length, tour_actions(self.moves, order)

@@ -139,7 +139,9 @@ def test_drops_of_a_pick_order_are_decoded_optimally(seed, n, onboard, bins):
     costs = np.empty((n + 1, len(instance.bins) + 1), np.int64)
     length = decode(instance, order, 0, costs)
     assert length == dropped_every_way(instance, order)
-    visits = to_visits(instance, tour_actions(instance, order).tolist(), problem.names[:n], problem.names[n:])
+    visits = to_visits(
+        instance, tour_actions(moves_of(instance), order), problem.names[:n], problem.names[n:]
+    )
     assert tour_length(problem, visits, problem.integers.metric) == length
     assert [problem.number[v.object] for v in visits if v.kind.value == "pick"] == order.tolist()
 
