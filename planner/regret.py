@@ -68,9 +68,8 @@ class RegretEvaluator:
         self._limit, self._radius = limit, radius
         self._search = search or TaskSearch(self._solver, limit)
         self._last: tuple[TaskState, dict[Visit, Regret]] | None = None
-        self._planned: tuple[RoutingProblem, Plan] | None = (
-            None  # last problem of `bounds`, and the plan for it
-        )
+        # Last problem of `bounds`, and the plan for it
+        self._planned: tuple[RoutingProblem, Plan] | None = None
 
     def copy(self) -> "RegretEvaluator":
         """Return a copy of this evaluator with the same limit, but with a budget of its own."""

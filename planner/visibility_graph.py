@@ -44,11 +44,11 @@ class VisibilityGraph:
         vertices = np.concatenate([np.empty((0, 6)), *found])
         island = np.repeat(np.arange(len(found)), [len(f) for f in found])
         walls = _edges(navmesh.solid)
-        later = np.arange(len(vertices)) > np.arange(len(vertices))[:, None]
-        views = [
-            VisibleVertices(*visible_vertices(vertex, vertices, usable, walls, TOLERANCE))
-            for vertex, usable in zip(vertices, later & (island == island[:, None]), strict=True)
-        ]
+        views = []
+        for i, vertex in enumerate(vertices):
+            later = island == island[i]
+            later[: i + 1] = False
+            views.append(VisibleVertices(*visible_vertices(vertex, vertices, later, walls, TOLERANCE)))
         seen = _with_rows(csr_array((0, len(vertices))), views)
         edges = csr_array(seen + seen.T)
         return cls(vertices=vertices, island=island.astype(np.int64), walls=walls, edges=edges)

@@ -27,7 +27,7 @@ class Expanded(NamedTuple):
 
 
 class State(NamedTuple):
-    """A state of the search."""
+    """A state that is expanded."""
 
     place: int
     left: int  # bit mask of the remaining objects

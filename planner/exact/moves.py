@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from planner.exact.instance import FAR, Instance
 
 NOWHERE = -1  # end of a move that is not possible
-NOTHING = -1  # index of the moves that pick up nothing, and bin of the object in an empty hand
+NOTHING = (
+    -1
+)  # last index, which stands for the moves that pick up nothing, and bin of the object in an empty hand
 
 
 class Moves(NamedTuple):
@@ -32,14 +34,14 @@ class Moves(NamedTuple):
     bins: int  # number of bins
     end: NDArray[np.int64]  # place after picking up each object or nothing, shape (places, n + 1, 2)
     length: NDArray[np.int64]  # length of the way to this place, shape (places, n + 1, 2)
-    column: NDArray[
-        np.int64
-    ]  # column of each place in `CostTable.entries`; the root has none, shape (places - 1,)
+    # Column of each place in a row of `CostTable.entries`, shape (places - 1,). The root has none.
+    column: NDArray[np.int64]
 
 
 def moves_of(inst: Instance) -> Moves:
     n, m = inst.to_bin.shape
     bins, objects, root, carried = np.arange(m), np.arange(n), m * m + n, inst.carried
+    # Bin of the object in hand at each place, and the places where there is one
     held = np.concatenate([np.tile(bins, m), inst.home, carried if carried.size == 1 else [NOTHING]])
     held[bins * (m + 1)] = NOTHING
     busy = np.flatnonzero(held != NOTHING)

@@ -48,25 +48,6 @@ def slot_of(nodes: Nodes, key: int) -> int:
     return slot
 
 
-@kernel
-def with_room(nodes: Nodes, more: int) -> Nodes:
-    size = nodes.size[0]
-    room = nodes.key.size
-    if size + more <= room:
-        return nodes
-    while size + more > room:
-        room *= 2
-    wider = new_nodes(room)
-    wider.size[0] = size
-    for k in range(size):
-        wider.key[k] = nodes.key[k]
-        wider.cost[k] = nodes.cost[k]
-        wider.total[k] = nodes.total[k]
-        wider.parent[k] = nodes.parent[k]
-        wider.slots[slot_of(wider, wider.key[k])] = k
-    return wider
-
-
 @inlined
 def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
     """Add a state, or update it if the new path is shorter. The layer must have free space."""
@@ -82,6 +63,20 @@ def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
     nodes.cost[k] = cost
     nodes.total[k] = total
     nodes.parent[k] = parent
+
+
+@kernel
+def with_room(nodes: Nodes, more: int) -> Nodes:
+    size = nodes.size[0]
+    room = nodes.key.size
+    if size + more <= room:
+        return nodes
+    while size + more > room:
+        room *= 2
+    wider = new_nodes(room)
+    for k in range(size):
+        offer(wider, nodes.key[k], nodes.cost[k], nodes.total[k], nodes.parent[k])
+    return wider
 
 
 @kernel

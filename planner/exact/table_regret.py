@@ -29,10 +29,10 @@ def costs_in(moves: Moves, table: CostTable, row: int, names: Sequence[str], car
     loose = np.flatnonzero(row // table.stride % (table.size[table.group] + 1)).tolist()
 
     def rest(picked: int, place: int) -> int:
-        price, left = (
-            (0, row) if picked == NOTHING else (table.multipliers[picked], row - table.stride[picked])
-        )
-        return int(price) + int(table.entries[left * table.width + moves.column[place]])
+        if picked == NOTHING:
+            return int(table.entries[row * table.width + moves.column[place]])
+        left = row - int(table.stride[picked])
+        return int(table.multipliers[picked]) + int(table.entries[left * table.width + moves.column[place]])
 
     return _first_costs(moves, {k: names[k] for k in loose}, carried, rest)
 
