@@ -69,23 +69,17 @@ class TaskTable:
         carried = problem.names[len(problem.shipments) :]
         return costs_in(state.moves, state.table, state.row, state.names, carried), state.instance.unit
 
-    def fits(self, problem: RoutingProblem) -> bool:
-        """Return True if a full table can be used for a problem."""
-        return self._solver.applies(problem) and self._solver.table_fits(_instance(problem))
-
     def _at(self, problem: RoutingProblem) -> TableState | None:
         state = _state(self._filled, problem) if self._filled is not None else None
         if state is not None:
             return state
-        if not self.fits(problem):
+        if not self._solver.applies(problem):
             return None
-        instance = _instance(problem)
+        instance = make_instance(problem, problem.integers.metric)
+        if not self._solver.table_fits(instance):
+            return None
         self._filled = _Filled(problem, instance, cast(CostTable, filled_table(instance)))
         return _state(self._filled, problem)
-
-
-def _instance(problem: RoutingProblem) -> Instance:
-    return make_instance(problem, problem.integers.metric)
 
 
 def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:

@@ -9,6 +9,7 @@ from planning_cases import BINS, SEARCH, Task, asked, planner_of, two_rooms
 from planner.errors import PlannerError, ProblemError, UnreachableError
 from planner.exact.solver import ExactSolver
 from planner.plan import Status, VisitKind
+from planner.problem import tour_length
 from planner.regret import RegretEvaluator
 from planner.route import TaskState
 from planner.service import Mode, Planner
@@ -46,7 +47,7 @@ def test_a_followed_plan_is_walked_to_its_end_without_a_change_of_mind(geodesics
             route = asked(guide, task.state)
             guide.wait()
             assert guide.improve(task.state) is None
-            left = TaskProblems(geodesics).length(task.state, route.visits)
+            left = tour_length(TaskProblems(geodesics).problem(task.state), route.visits)
             assert left == pytest.approx(planned.plan.cost - walked, abs=1e-6)
         assert guide.next is None
         assert guide.replans == 0
@@ -85,7 +86,7 @@ def test_a_nudge_moves_the_stop_and_a_long_push_replans(geodesics):
     route = asked(guide, task.state)
     assert route.visits == order
     assert guide.replans == 0
-    planned = TaskProblems(geodesics).length(task.state, order)
+    planned = tour_length(TaskProblems(geodesics).problem(task.state), order)
     assert planned == pytest.approx(length(geodesics, task, order), abs=1e-6)
     task.loose[name] = (x + 0.5, y)
     asked(guide, task.state)
