@@ -1,13 +1,14 @@
 """Kernels that expand one layer of the search.
 
 Layer k contains the states in which k objects have been picked up. A state is encoded as U * 2^12 + place, where U is
-the bit mask of the remaining objects. `planner.exact.moves` numbers the places.
+the bit mask of the remaining objects. `planner.exact.moves` numbers the places. These kernels read the distances of the
+instance instead of its moves, which takes a third less time.
 """
 
 from typing import NamedTuple
 
 from mjsim.support.kernels import inlined, kernel
-from planner.exact.moves import NOTHING, Moves
+from planner.exact.instance import Instance
 from planner.exact.nodes import NO_PARENT, Nodes, offer, with_room, with_room_among
 from planner.exact.table import INFINITE, CostTable
 from planner.solvers import Deadline
@@ -26,15 +27,6 @@ class Expanded(NamedTuple):
     end: int  # index of the state that ends the shortest complete tour, or -1
 
 
-class State(NamedTuple):
-    """A state that is expanded."""
-
-    place: int
-    left: int  # bit mask of the remaining objects
-    cost: int
-    as_parent: int  # parent of its next states in the next layer, which is even, or `NO_PARENT`
-
-
 @kernel
 def row_of(table: CostTable, left: int) -> int:
     row = 0
@@ -44,36 +36,70 @@ def row_of(table: CostTable, left: int) -> int:
     return row
 
 
+class LegEnd(NamedTuple):
+    """The state at the end of a leg, before an object is picked up or placed."""
+
+    left: int
+    row: int
+    cost: int
+    parent: int
+
+
 @inlined
-def offer_next(moves: Moves, table: CostTable, here: Nodes, after: Nodes, state: State, limit: int) -> None:
-    """Add the states after each move to their layers if their totals are below the limit."""
-    row = row_of(table, state.left)
-    for j in range(NOTHING, table.stride.size):
-        price, left, start = 0, state.left, row
-        if j >= 0:
-            if not left >> j & 1:
-                continue
-            price, left, start = table.multipliers[j], left ^ (1 << j), row - table.stride[j]
-        for way in range(2):
-            end = moves.end[state.place, j, way]
-            if end >= 0:
-                cost = state.cost + price + moves.length[state.place, j, way]
-                total = cost + table.entries[start * table.width + moves.column[end]]
-                if total < limit and j >= 0:
-                    offer(after, (left << PLACE_BITS) | end, cost, total, state.as_parent)
-                elif total < limit:
-                    offer(here, (left << PLACE_BITS) | end, cost, total, state.as_parent | 1)
+def offer_bin(
+    inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, b: int, d: int, limit: int
+) -> None:
+    """Add a state at bin b to a layer if the total of the state is below the limit."""
+    total = arrival.cost + table.bin[arrival.row, b, d]
+    if total < limit:
+        place = b * inst.bins.shape[0] + d
+        offer(nodes, (arrival.left << PLACE_BITS) | place, arrival.cost, total, arrival.parent)
+
+
+@inlined
+def offer_second(
+    inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, j: int, d: int, limit: int
+) -> None:
+    c = inst.home[j]
+    left, row = arrival.left ^ (1 << j), arrival.row - table.stride[j]
+    cost = arrival.cost + table.multipliers[j]
+    first = LegEnd(left, row, cost + inst.to_bin[j, d], arrival.parent)
+    offer_bin(inst, table, nodes, first, d, c, limit)
+    if c != d:
+        second = LegEnd(left, row, cost + inst.to_bin[j, c], arrival.parent)
+        offer_bin(inst, table, nodes, second, c, d, limit)
+
+
+@inlined
+def offer_only(inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, i: int, limit: int) -> None:
+    cost = arrival.cost + table.multipliers[i]
+    total = cost + table.object[arrival.row - table.stride[i], i]
+    if total < limit:
+        place = inst.bins.shape[0] ** 2 + i
+        offer(nodes, ((arrival.left ^ (1 << i)) << PLACE_BITS) | place, cost, total, arrival.parent)
 
 
 @kernel
-def offer_first(moves: Moves, table: CostTable, here: Nodes, after: Nodes, limit: int) -> None:
+def offer_roots(inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int) -> None:
     """Add the states that directly follow the start of a tour to the first two layers."""
-    root = State(moves.end.shape[0] - 1, (1 << table.stride.size) - 1, 0, NO_PARENT)
-    offer_next(moves, table, here, after, root, limit)
+    n = inst.home.size
+    left, row = (1 << n) - 1, table.bin.shape[0] - 1
+    if inst.carried.size == 0:
+        for i in range(n):
+            arrival = LegEnd(left, row, int(inst.root[i]), NO_PARENT)
+            offer_only(inst, table, after, arrival, i, limit)
+        return
+    d, other = inst.carried[0], inst.carried[inst.carried.size - 1]
+    offer_bin(inst, table, here, LegEnd(left, row, int(inst.root_bin[d]), NO_PARENT), d, other, limit)
+    if inst.carried.size == 2:
+        offer_bin(inst, table, here, LegEnd(left, row, int(inst.root_bin[other]), NO_PARENT), other, d, limit)
+        return
+    for j in range(n):
+        offer_second(inst, table, after, LegEnd(left, row, int(inst.root[j]), NO_PARENT), j, d, limit)
 
 
 def expand(
-    moves: Moves, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, deadline: Deadline
+    inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, deadline: Deadline
 ) -> Expanded | None:
     """Expand all states of a layer. Return None if the deadline passes first.
 
@@ -81,47 +107,73 @@ def expand(
     """
     smallest, states, end = INFINITE, 0, -1
     here = with_room(here, int(here.size[0]))
-    for with_object in (True, False):
+    for expand_some in (expand_carrying, expand_empty):
         size = int(here.size[0])
         for first in range(0, size, SLICE):
             if first and deadline.over():
                 return None
             last = min(size, first + SLICE)
-            after, dropped, count, end = expand_some(
-                moves, table, here, after, limit, width, first, last, with_object, end
-            )
+            after, dropped, count, found = expand_some(inst, table, here, after, limit, width, first, last)
             smallest, states = min(smallest, dropped), states + count
+            if found >= 0 and (end < 0 or here.cost[found] < here.cost[end]):
+                end = int(found)
     return Expanded(here, after, smallest, states, end)
 
 
 @kernel
-def expand_some(
-    moves: Moves,
-    table: CostTable,
-    here: Nodes,
-    after: Nodes,
-    limit: int,
-    width: int,
-    first: int,
-    last: int,
-    with_object: bool,
-    end: int,
+def expand_carrying(
+    inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
 ) -> tuple[Nodes, int, int, int]:
-    """Expand the states of a layer from `first` to `last` - 1 that have an object in hand, or those that have none.
-
-    Return the next layer, the smallest total of the dropped states, the number of states, and the best end so far.
-    """
-    n = table.stride.size
+    n, m = inst.to_bin.shape
     smallest, expanded = INFINITE, 0
     for k in range(first, last):
-        place, left = here.key[k] & ((1 << PLACE_BITS) - 1), here.key[k] >> PLACE_BITS
-        if here.total[k] >= limit or (moves.end[place, NOTHING, 0] >= 0) != with_object:
+        place = here.key[k] & ((1 << PLACE_BITS) - 1)
+        i = place - m * m
+        b, d = place // m, place % m
+        if here.total[k] >= limit or (i < 0 and b == d):
             continue
         expanded += 1
-        if left == 0 and not with_object and (end < 0 or here.cost[k] < here.cost[end]):
-            end = k
+        if i >= 0:
+            d, home_leg = inst.home[i], inst.to_bin[i, inst.home[i]]
+        else:
+            home_leg = inst.bins[b, d]
+        left = here.key[k] >> PLACE_BITS
+        row = row_of(table, left)
+        arrival = LegEnd(left, row, int(here.cost[k] + home_leg), 2 * k + 1)
+        offer_bin(inst, table, here, arrival, d, d, limit)
         if after.size[0] + 2 * n > after.key.size:
             after, dropped = with_room_among(after, 2 * n, width)
             smallest = min(smallest, dropped)
-        offer_next(moves, table, here, after, State(place, left, here.cost[k], 2 * k), limit)
+        for j in range(n):
+            if not left >> j & 1:
+                continue
+            leg = inst.between[i, j] if i >= 0 else inst.to_bin[j, b]
+            arrival = LegEnd(left, row, int(here.cost[k] + leg), 2 * k)
+            offer_second(inst, table, after, arrival, j, d, limit)
+    return after, smallest, expanded, -1
+
+
+@kernel
+def expand_empty(
+    inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
+) -> tuple[Nodes, int, int, int]:
+    n, m = inst.to_bin.shape
+    smallest, expanded, end = INFINITE, 0, -1
+    for k in range(first, last):
+        place = here.key[k] & ((1 << PLACE_BITS) - 1)
+        b = place // m
+        if here.total[k] >= limit or place >= m * m or b != place % m:
+            continue
+        expanded += 1
+        left = here.key[k] >> PLACE_BITS
+        if left == 0 and (end < 0 or here.cost[k] < here.cost[end]):
+            end = k
+        row = row_of(table, left)
+        if after.size[0] + n > after.key.size:
+            after, dropped = with_room_among(after, n, width)
+            smallest = min(smallest, dropped)
+        for i in range(n):
+            if left >> i & 1:
+                arrival = LegEnd(left, row, int(here.cost[k] + inst.to_bin[i, b]), 2 * k)
+                offer_only(inst, table, after, arrival, i, limit)
     return after, smallest, expanded, end

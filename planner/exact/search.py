@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.exact.annealing import anneal, completed, tour_actions
-from planner.exact.expand import PLACE_BITS, expand, offer_first
+from planner.exact.expand import PLACE_BITS, expand, offer_roots
 from planner.exact.instance import MAX_SEARCHED, Instance
 from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown, warm_bound
 from planner.exact.nodes import FIRST_ROOM, NO_PARENT, keep_best, new_nodes
@@ -97,13 +97,13 @@ def beam_pass(bound: Bound, upper: int, width: int, max_states: int, deadline: D
     limit = upper - bound.instance.tie + prices
     history: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
     here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
-    offer_first(bound.moves, bound.table, here, after, limit)
+    offer_roots(bound.instance, bound.table, here, after, limit)
     left_out, expanded, actions = INFINITE, 0, None
     for layer in range(n + 1):
         if expanded > max_states or deadline.over():
             return Pass(upper, None, bound.root, expanded)
         here, worse = keep_best(here, width)
-        found = expand(bound.moves, bound.table, here, after, limit, width, deadline)
+        found = expand(bound.instance, bound.table, here, after, limit, width, deadline)
         if found is None:
             return Pass(upper, None, bound.root, expanded)
         here, after, early, states, end = found

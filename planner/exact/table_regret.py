@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
-from planner.exact.expand import PLACE_BITS, expand, offer_first
+from planner.exact.expand import PLACE_BITS, expand, offer_roots
 from planner.exact.instance import MAX_SEARCHED
 from planner.exact.moves import NOTHING, Moves
 from planner.exact.multipliers import Bound
@@ -71,10 +71,10 @@ def costs_by_pass(
     limit = longest + 1 + bound.prices
     layers: list[Nodes] = []
     here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
-    offer_first(moves, table, here, after, limit)
+    offer_roots(bound.instance, table, here, after, limit)
     states = 0
     for _ in range(n + 1):
-        expanded = expand(moves, table, here, after, limit, UNLIMITED, deadline)
+        expanded = expand(bound.instance, table, here, after, limit, UNLIMITED, deadline)
         if expanded is None:
             return None, states
         layers.append(expanded.here)
@@ -114,9 +114,11 @@ def sweep(moves: Moves, here: Nodes, after: Nodes, after_rest: NDArray[np.int64]
             if with_object:
                 best = min(INFINITE, moves.length[place, NOTHING, 0] + look_up(here, rest, left, home))
             for j in range(moves.end.shape[1] - 1):
+                if not left >> j & 1:
+                    continue
                 for way in range(2):
                     end = moves.end[place, j, way]
-                    if left >> j & 1 and end >= 0:
+                    if end >= 0:
                         then = look_up(after, after_rest, left ^ (1 << j), end)
                         best = min(best, moves.length[place, j, way] + then)
             rest[k] = best
