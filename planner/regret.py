@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from planner.errors import ProblemError
 from planner.exact.instance import make_instance
+from planner.exact.moves import moves_of
 from planner.exact.multipliers import Bound, first_bound, grown, warm_bound
 from planner.exact.solver import ExactSolver
 from planner.exact.table_regret import Costs, costs_by_pass, costs_in
@@ -283,7 +284,9 @@ def _around_best(
 def _least(bound: Bound, problem: RoutingProblem) -> Costs:
     """Return a lower bound on the cost of each possible next visit, in units."""
     n, table = len(problem.shipments), bound.table
-    relaxed = costs_in(bound.moves, table, len(table.bin) - 1, problem.names[:n], problem.names[n:])
+    relaxed = costs_in(
+        moves_of(bound.instance), table, len(table.bin) - 1, problem.names[:n], problem.names[n:]
+    )
     return {visit: cost - bound.prices for visit, cost in relaxed.items()}
 
 

@@ -7,7 +7,7 @@ proof works" in docs/planners.md explains the method.
     full_table    a table over all subsets of the objects
     task_table    a full table that is reused for successive states of a task
     instance      a routing problem as integer arrays
-    moves         all moves of a tour, which the tables and searches share
+    moves         all moves of a tour, from which costs of next visits and a tour's actions follow
     table         the recursion and its relaxation, and NumPy code for small tables
       table_kernels   compiled code for tables of any size
     search        annealing, followed by beam searches of increasing width

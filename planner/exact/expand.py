@@ -2,7 +2,7 @@
 
 Layer k contains the states in which k objects have been picked up. A state is encoded as U * 2^12 + place, where U is
 the bit mask of the remaining objects. `planner.exact.moves` numbers the places. These kernels read the distances of the
-instance instead of its moves, which takes a third less time.
+instance instead of its moves, with which a layer takes half as much time more.
 """
 
 from typing import NamedTuple

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.exact.instance import Instance
-from planner.exact.moves import Moves, moves_of
 from planner.exact.table import CostTable, Solution, fill_layers, new_table, walk
 from planner.plan import Certificate, Proof
 from planner.solvers import NEVER, Deadline
@@ -30,7 +29,7 @@ def by_table(inst: Instance, deadline: Deadline = NEVER) -> list[Solution]:
     table = filled_table(inst, deadline)
     if table is None:
         return []
-    length, actions = follow(moves_of(inst), table, len(table.bin) - 1)
+    length, actions = follow(inst, table, len(table.bin) - 1)
     return [Solution(actions, length, Certificate(Proof.FULL_TABLE, inst.unit, length))]
 
 
@@ -48,16 +47,16 @@ def filled_table(inst: Instance, deadline: Deadline = NEVER) -> CostTable | None
     return table
 
 
-def follow(moves: Moves, table: CostTable, row: int) -> tuple[int, list[int]]:
+def follow(inst: Instance, table: CostTable, row: int) -> tuple[int, list[int]]:
     """Return the length and the actions of a shortest tour in a full table.
 
     `row` is the table row of the objects that remain at the start.
     """
-    actions: NDArray[np.int64] = np.empty(2 * len(table.stride) + 2, np.int64)
+    actions: NDArray[np.int64] = np.empty(2 * len(inst.home) + 2, np.int64)
     if COMPILER in sys.modules:
         from planner.exact.table_kernels import walk as compiled_walk
 
-        length, count = compiled_walk(moves, table, row, actions)
+        length, count = compiled_walk(inst, table, row, actions)
     else:
-        length, count = walk(moves, table, row, actions)
+        length, count = walk(inst, table, row, actions)
     return int(length), actions[:count].tolist()

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
 from planner.exact.instance import Instance
-from planner.exact.moves import Moves, moves_of
 from planner.exact.table import CostTable, new_table, rows_of
 from planner.exact.table_kernels import fill, fill_rows, walk
 from planner.exact.warm_start import Start
@@ -40,7 +39,6 @@ class Bound:
     """A lower bound on the cost-to-go from every state of an instance."""
 
     instance: Instance
-    moves: Moves
     table: CostTable
     root: int  # lower bound at the root, in units
     # Average deviation from one pick per object in relaxed tours, shape (n,). Recent tours have more weight.
@@ -61,7 +59,7 @@ def first_bound(instance: Instance, upper: int) -> Bound:
     """Fit multipliers with all objects in a single group. `upper` is the length of a known tour."""
     n = len(instance.home)
     table = new_table(instance, np.zeros(n, np.int64))
-    bound = fit(instance, moves_of(instance), table, np.zeros(n), upper, FIRST_STEPS, FIRST_STEP_SIZES, NEVER)
+    bound = fit(instance, table, np.zeros(n), upper, FIRST_STEPS, FIRST_STEP_SIZES, NEVER)
     return cast(Bound, bound)  # without a deadline, `fit` never returns None
 
 
@@ -76,9 +74,8 @@ def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:
     table = new_table(instance, group)
     table.multipliers[:] = start.multipliers
     fill(instance, table)
-    moves = moves_of(instance)
-    total, _ = walk(moves, table, len(table.bin) - 1, np.empty(2 * n + 2, np.int64))
-    return Bound(instance, moves, table, int(total) - int(table.multipliers.sum()), np.zeros(n))
+    total, _ = walk(instance, table, len(table.bin) - 1, np.empty(2 * n + 2, np.int64))
+    return Bound(instance, table, int(total) - int(table.multipliers.sum()), np.zeros(n))
 
 
 def grown(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
@@ -133,12 +130,11 @@ def _refitted(
 ) -> Bound | None:
     table = new_table(bound.instance, group)
     start = bound.table.multipliers.astype(np.float64)
-    return fit(bound.instance, bound.moves, table, start, upper, steps, STEP_SIZES, deadline)
+    return fit(bound.instance, table, start, upper, steps, STEP_SIZES, deadline)
 
 
 def fit(
     instance: Instance,
-    moves: Moves,
     table: CostTable,
     multipliers: NDArray[np.float64],
     upper: int,
@@ -161,14 +157,14 @@ def fit(
         np.array([first_size * (last_size / first_size) ** (k / steps) for k in range(steps)]),
         np.array([0, -1]),
     )
-    while not climb(instance, moves, table, ascent, upper, SLICE):
+    while not climb(instance, table, ascent, upper, SLICE):
         if deadline.over():
             return None
-    return Bound(instance, moves, table, int(ascent.progress[BEST]), ascent.violation)
+    return Bound(instance, table, int(ascent.progress[BEST]), ascent.violation)
 
 
 @kernel
-def climb(inst: Instance, moves: Moves, table: CostTable, ascent: Ascent, upper: int, rows: int) -> bool:
+def climb(inst: Instance, table: CostTable, ascent: Ascent, upper: int, rows: int) -> bool:
     """Continue a subgradient ascent until `rows` table rows are filled. Return True if it is finished.
 
     At the end, the table contains the best multipliers and the corresponding entries. The ascent is a single
@@ -182,7 +178,7 @@ def climb(inst: Instance, moves: Moves, table: CostTable, ascent: Ascent, upper:
             table.multipliers[j] = int(min(max(price, -table.dearest), table.dearest))
         fill_rows(inst, table, 0, table.bin.shape[0])
         rows -= table.bin.shape[0]
-        total, count = walk(moves, table, table.bin.shape[0] - 1, actions)
+        total, count = walk(inst, table, table.bin.shape[0] - 1, actions)
         value = total - table.multipliers.sum()
         if value > progress[BEST]:
             progress[BEST] = value

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from planner.exact.annealing import anneal, completed, tour_actions
 from planner.exact.expand import PLACE_BITS, expand, offer_roots
 from planner.exact.instance import MAX_SEARCHED, Instance
+from planner.exact.moves import moves_of
 from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown, warm_bound
 from planner.exact.nodes import FIRST_ROOM, NO_PARENT, keep_best, new_nodes
 from planner.exact.table import BIN_ROWS, INFINITE, Solution
@@ -69,7 +70,7 @@ def _first_tour(
         length, order = anneal(instance, seed, WARM_MOVES, order, *WARM_TEMPERATURES)
         bound = warm_bound(instance, start, warm_rows)
     upper, lower, expanded = length, bound.root, 0
-    actions = tour_actions(bound.moves, order)
+    actions = tour_actions(moves_of(instance), order)
     if start is not None and work > 0 and len(instance.home) <= MAX_SEARCHED:
         narrow = beam_pass(bound, upper, WARM_WIDTH, work, NEVER)
         lower, expanded = max(lower, narrow.lower), narrow.expanded

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mjsim.support.kernels import kernel
 from planner.exact.expand import PLACE_BITS, expand, offer_roots
 from planner.exact.instance import MAX_SEARCHED
-from planner.exact.moves import NOTHING, Moves
+from planner.exact.moves import NOTHING, Moves, moves_of
 from planner.exact.multipliers import Bound
 from planner.exact.nodes import FIRST_ROOM, Nodes, new_nodes, slot_of
 from planner.exact.table import INFINITE, CostTable
@@ -65,7 +65,7 @@ def costs_by_pass(
     of the loose and the carried objects. The costs are None if there are too many objects, more than `max_states`
     states, or the deadline has passed.
     """
-    moves, table, n = bound.moves, bound.table, len(names)
+    moves, table, n = moves_of(bound.instance), bound.table, len(names)
     if n > MAX_SEARCHED:
         return None, 0
     limit = longest + 1 + bound.prices

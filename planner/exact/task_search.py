@@ -109,9 +109,10 @@ class TaskSearch:
 
     def _bounded(self, problem: RoutingProblem, instance: Instance, seed: int, end: Deadline) -> Solution:
         from planner.exact.annealing import anneal, completed, tour_actions
+        from planner.exact.moves import moves_of
         from planner.exact.multipliers import first_bound, grown
 
         order = completed(instance, self._warm.indices(problem.names[: len(problem.shipments)]))
         length, order = anneal(instance, seed, MOVES, order, *TEMPERATURES)
         bound = grown(first_bound(instance, length), length, ROWS, end)
-        return Solution(tour_actions(bound.moves, order), min(bound.root, length), bound.certificate)
+        return Solution(tour_actions(moves_of(instance), order), min(bound.root, length), bound.certificate)

@@ -12,7 +12,7 @@ import numpy as np
 
 from planner.exact.full_table import filled_table, follow
 from planner.exact.instance import FAR, Instance, make_instance, to_visits
-from planner.exact.moves import Moves, moves_of
+from planner.exact.moves import moves_of
 from planner.exact.table import CostTable
 from planner.plan import Certificate, Plan, Proof, Visit
 from planner.problem import RoutingProblem, make_plan
@@ -22,10 +22,9 @@ if TYPE_CHECKING:
 
 
 class TableState(NamedTuple):
-    """A task state as a row of a full table. The moves begin at the person's current position."""
+    """A task state as a row of a full table. The root of the instance is the person's current position."""
 
     instance: Instance
-    moves: Moves
     table: CostTable
     row: int
     names: tuple[str, ...]
@@ -51,7 +50,7 @@ class TaskTable:
         state = self._at(problem)
         if state is None:
             return None
-        length, actions = follow(state.moves, state.table, state.row)
+        length, actions = follow(state.instance, state.table, state.row)
         visits = to_visits(state.instance, actions, state.names, problem.names[len(problem.shipments) :])
         certificate = Certificate(Proof.FULL_TABLE, state.instance.unit, length)
         return make_plan(problem, visits, length, length, started, certificate)
@@ -67,7 +66,9 @@ class TaskTable:
         if state is None:
             return None
         carried = problem.names[len(problem.shipments) :]
-        return costs_in(state.moves, state.table, state.row, state.names, carried), state.instance.unit
+        return costs_in(
+            moves_of(state.instance), state.table, state.row, state.names, carried
+        ), state.instance.unit
 
     def _at(self, problem: RoutingProblem) -> TableState | None:
         state = _state(self._filled, problem) if self._filled is not None else None
@@ -107,4 +108,4 @@ def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
     carried = np.array(bin_of[n:], dtype=np.int64)
     instance = filled.instance._replace(root=root, root_bin=root_bin, carried=carried)
     names = before.names[: len(before.shipments)]
-    return TableState(instance, moves_of(instance), filled.table, sum(1 << k for k in left), names)
+    return TableState(instance, filled.table, sum(1 << k for k in left), names)
