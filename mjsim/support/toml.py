@@ -1,8 +1,9 @@
 """Read TOML files, and find the line numbers of their keys."""
 
+import json
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,19 @@ def line_of(text: str, *keys: str) -> int | None:
             return found[0]
         keys = tuple(key[: max(key.rfind("."), key.rfind("["), 0)] for key in keys)
     return None
+
+
+def toml_tables(tables: Mapping[str, Mapping[str, object]]) -> str:
+    """Format named tables as TOML. Their values are texts, whole numbers, and lists of these."""
+    blocks = [
+        [
+            f"[{name}]",
+            *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in table.items()),
+            "",
+        ]
+        for name, table in tables.items()
+    ]
+    return "\n".join(line for block in blocks for line in block)
 
 
 def joined_key(table: str, key: str) -> str:
