@@ -52,11 +52,8 @@ class Atlas:
         """Return the triangle (k,) and the barycentric coordinates (k, 3) of each pixel, block by block."""
         faces = np.repeat(np.arange(len(self.blocks)), np.prod(self.blocks[:, 2:], axis=1))
         pixels = self._pixels() - self.blocks[faces, :2] + 0.5
-        a, b, c = (self.shapes[faces, k] for k in range(3))
-        whole = _cross(b - a, c - a)
-        second, third = _cross(pixels - a, c - a) / whole, _cross(b - a, pixels - a) / whole
-        weights = np.clip(np.column_stack((1 - second - third, second, third)), 0.0, 1.0)
-        return faces, weights / weights.sum(axis=1, keepdims=True)
+        flat = np.pad(self.shapes[faces], ((0, 0), (0, 0), (0, 1)))
+        return faces, _projected(flat, np.pad(pixels, ((0, 0), (0, 1))))
 
     def picture(self, colours: Floats) -> NDArray[np.uint8]:
         """Create an image (SIDE, SIDE, 3) from the colours (k, 3) of all `texels`, as RGB from 0 to 1."""
@@ -110,10 +107,6 @@ def _shelves(flat: Floats, scale: float) -> Ints | None:
         blocks[k] = x, y, w, h
         x, row = x + w, max(row, h)
     return blocks
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 @dataclass(frozen=True, eq=False)
