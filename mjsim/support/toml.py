@@ -1,4 +1,4 @@
-"""Read TOML files, and find the line numbers of their keys."""
+"""Read and format TOML files, and find the line numbers of their keys."""
 
 import json
 import re
@@ -62,15 +62,11 @@ def line_of(text: str, *keys: str) -> int | None:
 
 def toml_tables(tables: Mapping[str, Mapping[str, object]]) -> str:
     """Format named tables as TOML. Their values are texts, whole numbers, and lists of these."""
-    blocks = [
-        [
-            f"[{name}]",
-            *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in table.items()),
-            "",
-        ]
-        for name, table in tables.items()
-    ]
-    return "\n".join(line for block in blocks for line in block)
+    lines = []
+    for name, table in tables.items():
+        values = (f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in table.items())
+        lines += [f"[{name}]", *values, ""]
+    return "\n".join(lines)
 
 
 def joined_key(table: str, key: str) -> str:
