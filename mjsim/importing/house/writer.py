@@ -17,7 +17,7 @@ from mjsim.importing.house.drawn_meshes import DrawnMesh, picture_key
 from mjsim.importing.house.floor_grid import FloorGrid
 from mjsim.importing.house.rooms import Rooms
 from mjsim.importing.house.solids import Solid
-from mjsim.importing.object.model_writer import comment, obj_lines, write_png
+from mjsim.importing.object.model_writer import comment, numbers, obj_lines, write_png
 from mjsim.support.toml import toml_tables
 
 MODEL = "house.xml"
@@ -156,7 +156,8 @@ def _sites(house: ImportedHouse) -> Iterator[str]:
 
 
 def _box(name: str, low: Floats, high: Floats) -> str:
-    return f'<geom class="solid" name="{name}" pos="{_numbers((low + high) / 2)}" size="{_numbers((high - low) / 2)}"/>'
+    middle, half = numbers((low + high) / 2, 5), numbers((high - low) / 2, 5)
+    return f'<geom class="solid" name="{name}" pos="{middle}" size="{half}"/>'
 
 
 def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> str:
@@ -188,7 +189,3 @@ def _relative(path: Path) -> str:
 
 def _name(text: str) -> str:
     return re.sub(r"[^A-Za-z0-9_]+", "_", text).strip("_")[:40] or "thing"
-
-
-def _numbers(values: Floats | Sequence[float]) -> str:
-    return " ".join(f"{value:.6g}" for value in np.round(values, 5) + 0.0)
