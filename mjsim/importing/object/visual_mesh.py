@@ -131,7 +131,7 @@ def make_visual_mesh(surface: Surface, mesh: trimesh.Trimesh) -> VisualMesh:
     coarse.fix_normals(multibody=True)
     vertices, faces = np.asarray(coarse.vertices), np.asarray(coarse.faces)
     normals = corner_normals(vertices, faces)
-    colour, uv, picture = _painted(surface, vertices[faces])
+    colour, uv, picture = _painted(surface, mesh, vertices[faces])
     if not closed:
         faces = np.concatenate((faces, faces[:, ::-1] + len(vertices)))
         vertices = np.concatenate((vertices, vertices - _SHEET * coarse.vertex_normals))
@@ -141,9 +141,9 @@ def make_visual_mesh(surface: Surface, mesh: trimesh.Trimesh) -> VisualMesh:
 
 
 def _painted(
-    surface: Surface, corners: Floats
+    surface: Surface, mesh: trimesh.Trimesh, corners: Floats
 ) -> tuple[tuple[float, float, float], Floats | None, NDArray[np.uint8] | None]:
-    sampled, triangles = trimesh.sample.sample_surface(surface.mesh(), _SAMPLES, seed=0)
+    sampled, triangles = trimesh.sample.sample_surface(mesh, _SAMPLES, seed=0)
     colours = surface.colours_at(triangles, _projected(surface.corners[triangles], sampled))
     red, green, blue = np.clip(colours.mean(axis=0), 0.0, 1.0).round(4).tolist()
     if np.ptp(colours, axis=0).max() <= _PLAIN:
