@@ -169,8 +169,8 @@ def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> str:
         "rooms": dict(house.rooms.names),
     }
     for c in categories:
-        about = {"label": c.label, "receptacle": c.receptacle, "objects": list(c.objects)}
-        tables[f"categories.{c.key}"] = about
+        own = {"label": c.label, "receptacle": c.receptacle}
+        tables[f"categories.{c.key}"] = {**own, "objects": list(c.objects)}
     for key, found in bins.items():
         known = catalogue.receptacles[key]
         place = {"place": found.place, "room": found.room}
