@@ -215,9 +215,8 @@ def _person_geoms(model: Any) -> NDArray[np.bool_]:
 def _overhead_geoms(model: Any, data: Any) -> NDArray[np.bool_]:
     """Return a mask of the static geoms above head height with free floor below them, such as lintels."""
     static = model.body_weldid[model.geom_bodyid] == 0
-    has_outline = model.geom_type > int(
-        mujoco.mjtGeom.mjGEOM_HFIELD
-    )  # all types but planes and height fields
+    # All types except planes and height fields have an outline.
+    has_outline = model.geom_type > int(mujoco.mjtGeom.mjGEOM_HFIELD)
     solid = np.flatnonzero(static & has_outline & np.isin(model.geom_group, TOP_DOWN_GROUPS))
     rotations = data.geom_xmat.reshape(-1, 3, 3)
     points = [outline_points(model, int(g), data.geom_xpos[g], rotations[g]) for g in solid]

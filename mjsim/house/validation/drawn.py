@@ -59,9 +59,8 @@ def coplanar_faces(compiled: Compiled) -> list[DrawnFault]:
     geoms = geoms[model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_BOX]
     geoms = geoms[np.abs(compiled.data.geom_xmat[geoms]).reshape(-1, 3, 3).max(axis=1).min(axis=1) > 1 - 1e-6]
     low, high = bounding_boxes(model, compiled.data, geoms)
-    textured = np.append(
-        (model.mat_texid >= 0).any(axis=1), False
-    )  # the last row is for geoms without material
+    # The last row is for geoms without material.
+    textured = np.append((model.mat_texid >= 0).any(axis=1), False)
     paint = np.column_stack([model.geom_matid[geoms], model.geom_rgba[geoms]])
     alike = ~textured[model.geom_matid[geoms]] & (paint[:, None] == paint).all(axis=2)
     found = []
