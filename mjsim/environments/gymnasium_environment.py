@@ -45,9 +45,8 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         self.render_mode = render_mode
         repeat = self.core.control.repeat if isinstance(self.core.control, Continuous) else 1
         fps = max(1, round(1 / (parsed.world.control_timestep * repeat)))
-        shown = [
-            mode for mode in modes if mode != "human" or can_open_window()
-        ]  # environment checkers try every mode in this list
+        # Environment checkers try every mode in this list.
+        shown = [mode for mode in modes if mode != "human" or can_open_window()]
         self.metadata = {**self.metadata, "render_modes": shown, "render_fps": fps}
         arrays = {name: to_space(spec) for name, spec in self.core.observation_spec.items()}
         self.observation_space = cast("spaces.Space[ObservationDict]", spaces.Dict(arrays))

@@ -23,6 +23,7 @@ from mjsim.formats.scene.source_scene import (
 )
 from mjsim.formats.scene.surface import Floats, Surface
 from mjsim.house.catalogue.model_files import check_replicates, elements, read_model
+from mjsim.house.compiled.footprint import bounding_boxes
 from mjsim.house.compiled.sites import PREFIX, RoomMap
 from mjsim.values.errors import AssetError
 
@@ -153,19 +154,9 @@ def _pieces(model: Any, pictures: dict[str, _Picture]) -> Iterator[ScenePiece]:
 
 
 def _covered(model: Any, data: Any, geom: int, looks: NDArray[np.intp]) -> bool:
-    low, high = _extent(model, data, geom)
-    for look in looks[model.geom_bodyid[looks] == model.geom_bodyid[geom]].tolist():
-        first, last = _extent(model, data, look)
-        if (first <= low + _COVER).all() and (last >= high - _COVER).all():
-            return True
-    return False
-
-
-def _extent(model: Any, data: Any, geom: int) -> tuple[Floats, Floats]:
-    rotation = data.geom_xmat[geom].reshape(3, 3)
-    centre = data.geom_xpos[geom] + rotation @ model.geom_aabb[geom, :3]
-    reach = np.abs(rotation) @ model.geom_aabb[geom, 3:]
-    return centre - reach, centre + reach
+    low, high = bounding_boxes(model, data, [geom])
+    first, last = bounding_boxes(model, data, looks[model.geom_bodyid[looks] == model.geom_bodyid[geom]])
+    return bool(((first <= low + _COVER) & (last >= high - _COVER)).all(axis=1).any())
 
 
 def _name(model: Any, geom: int) -> str:

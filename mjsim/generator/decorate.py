@@ -8,6 +8,7 @@ import numpy as np
 from mjsim.generator.furniture.appearance import Appearance
 from mjsim.generator.furniture.catalogue import KINDS
 from mjsim.generator.furniture.piece import Piece, Point, flattened, moved, moved_point, overlap
+from mjsim.generator.openings import gaps
 from mjsim.generator.poses import WALL_GAP
 from mjsim.generator.space import BLINDS, PiecePose, Space, footprint
 from mjsim.generator.values import BACK, SIDES, HomePlan, Rectangle, Side, Window
@@ -206,14 +207,7 @@ def _stretches(space: Space, side: Side, low: float, high: float) -> list[tuple[
             apart = BESIDE_TILES if top == LOW + 1 else 0.05
             start, end = Rectangle(x0, y0, x1, y1).wall(side)
             blocked.append((start - apart, end + apart))
-    found, at = [], low + WALL_GAP
-    for a, b in sorted(blocked):
-        if a - at > 0.7:
-            found.append((at, a))
-        at = max(at, b)
-    if high - at > 0.7:
-        found.append((at, high))
-    return found
+    return [(a, b) for a, b in gaps(low + WALL_GAP, high, blocked) if b - a > 0.7]
 
 
 def _over(space: Space, side: Side, first: float, last: float) -> float:

@@ -1,6 +1,5 @@
 """Write the MJCF model, catalogue, recipe and textures of a generated house."""
 
-import json
 import math
 import re
 import xml.etree.ElementTree as ET
@@ -13,7 +12,7 @@ from mjsim.generator.recipe import RECIPE, Recipe
 from mjsim.generator.shell import shell
 from mjsim.generator.values import Asset, Furnishing
 from mjsim.generator.views import landscapes
-from mjsim.support.toml import read_toml
+from mjsim.support.toml import read_toml, toml_tables
 
 # Model that provides default classes, materials, categories and objects for all generated houses.
 STYLE = "houses/apartment"
@@ -132,14 +131,12 @@ def _catalogue(recipe: Recipe, furnishing: Furnishing, models: Path) -> str:
         for key, entry in source["receptacles"].items()
         if key in mounts
     }
-    tables = {
-        "house": {"label": f"House {recipe.seed}", "model": "house.xml", "points": points},
-        "rooms": {room.key: room.label for room in plan.rooms},
-        **{f"categories.{key}": entry for key, entry in categories.items()},
-        **{f"receptacles.{key}": entry for key, entry in receptacles.items()},
-        **{f"objects.{key}": source["objects"][key] for key in objects},
-    }
-    lines = []
-    for name, table in tables.items():
-        lines += [f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in table.items()), ""]
-    return "\n".join(lines)
+    return toml_tables(
+        {
+            "house": {"label": f"House {recipe.seed}", "model": "house.xml", "points": points},
+            "rooms": {room.key: room.label for room in plan.rooms},
+            **{f"categories.{key}": entry for key, entry in categories.items()},
+            **{f"receptacles.{key}": entry for key, entry in receptacles.items()},
+            **{f"objects.{key}": source["objects"][key] for key in objects},
+        }
+    )

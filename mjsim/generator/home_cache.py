@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 import hashlib
-from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.files import MAX_EXTENDS, base_of
 from mjsim.house.catalogue.generated_names import parse_name
 from mjsim.house.catalogue.house_ref import CATALOGUE, HouseRef, models_root, parse_house
-from mjsim.support.files import digest_of, work_folder
+from mjsim.support.files import digest_of, write_folder
 from mjsim.support.kernels import cache_base
 from mjsim.values.errors import HouseError
 
@@ -63,28 +62,14 @@ def _generated_catalogue(house: HouseRef, models: Path) -> Path:
             recipe, furnishing = made_of, furnish_plan(made_of.seed, made_of.plan)
         else:
             recipe, furnishing = generate(made_of.seed, made_of.rooms)
-        _write(folder, house_files(recipe, furnishing, models))
+        files = house_files(recipe, furnishing, models)
+        try:
+            write_folder(folder, files)
+        except OSError as error:
+            raise HouseError(
+                f"cannot write the house to {folder}: {error.strerror}; free some space there"
+            ) from error
     return folder / CATALOGUE
-
-
-def _write(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write a folder atomically. If another process has written it in the meantime, keep that version."""
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with work_folder(folder.parent) as work:
-            for name, content in files.items():
-                (work / name).parent.mkdir(exist_ok=True)
-                (work / name).write_bytes(content)
-            try:
-                work.chmod(0o755)
-                work.rename(folder)
-            except OSError:
-                if not (folder / CATALOGUE).is_file():
-                    raise
-    except OSError as error:
-        raise HouseError(
-            f"cannot write the house to {folder}: {error.strerror}; free some space there"
-        ) from error
 
 
 @functools.cache

@@ -1,6 +1,6 @@
 """Place doors, door leaves and windows in a floor plan."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -84,15 +84,18 @@ def wall_stretches(room: Room, side: Side, rooms: Sequence[Room]) -> list[tuple[
         found = shared_wall(room, other) if other is not room else None
         if found and found[0] == side:
             cuts.append((max(start, found[1] - WALL / 2), min(end, found[2] + WALL / 2)))
-    stretches, at = [], start
-    for low, high in sorted(cuts):
-        if low > at + 1e-6:
-            stretches.append((at, low, True))
-        stretches.append((low, high, False))
-        at = high
-    if at < end - 1e-6:
-        stretches.append((at, end, True))
-    return stretches
+    outer = [(low, high, True) for low, high in gaps(start, end, cuts) if high - low > 1e-6]
+    return sorted([*outer, *((low, high, False) for low, high in cuts)])
+
+
+def gaps(start: float, end: float, taken: Iterable[tuple[float, float]]) -> Iterator[tuple[float, float]]:
+    """Yield the parts of an interval that none of the taken intervals covers."""
+    for low, high in sorted(taken):
+        if low > start:
+            yield start, low
+        start = max(start, high)
+    if end > start:
+        yield start, end
 
 
 def _extra_ways(programme: Programme, rooms: Sequence[Room], rng: np.random.Generator) -> Iterator[Way]:
@@ -253,9 +256,8 @@ def _from_corner(floor: Rectangle, side: Side, corner: Side, width: float) -> Re
 def _fits(plan: HomePlan, leaf: Leaf, own: Door, taken: Sequence[Rectangle]) -> bool:
     room = plan.room(leaf.room)
     inside, floor = room.floor, leaf.floor
-    if floor.x0 < inside.x0 - 1e-6 or floor.y0 < inside.y0 - 1e-6:
-        return False
-    if floor.x1 > inside.x1 + 1e-6 or floor.y1 > inside.y1 + 1e-6:
+    limits = inside.grown(1e-6)
+    if not (limits.contains(floor.x0, floor.y0) and limits.contains(floor.x1, floor.y1)):
         return False
     others = [door for door in plan.doors_of(room.key) if door is not own]
     if any(_before(room, door, 0.3).overlaps(floor) for door in others):

@@ -3,13 +3,11 @@
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from mjsim.generator.default_furniture import SHOWN_NAMES
 from mjsim.generator.furniture.appearance import Appearance
-from mjsim.generator.furniture.piece import BIN_SIZES, Piece, Point, flattened, moved, moved_point
+from mjsim.generator.furniture.piece import BIN_SIZES, Piece, Point, flattened, moved_point
 from mjsim.generator.space import PiecePose, Space, footprint
-from mjsim.generator.values import BinPlacement, HomePlan, Placement, Rectangle
+from mjsim.generator.values import BinPlacement, HomePlan, Placement
 from mjsim.values.episode import FLOOR_SHARE
 
 # Number of points for objects per square metre of floor, low enough for furnished homes.
@@ -44,14 +42,10 @@ def placed(room: str, piece: Piece, pose: PiecePose, look: Appearance) -> list[P
     for member, x, y, yaw in flattened(piece, pose.x, pose.y, pose.yaw):
         turns = round(yaw / (math.pi / 2))
         turn = yaw - turns * math.pi / 2
-        footprint = None
-        if member.parts and not member.members:
-            spots = np.array([moved(part.spot, x, y, yaw) for part in member.parts])
-            footprint = Rectangle(*spots[:, :2].min(axis=0).tolist(), *spots[:, 2:].max(axis=0).tolist())
         own = [asset for picture in member.pictures for asset in picture.assets]
         assets, position = (*look.assets_of(member.geoms), *own), (round(x, 4), round(y, 4), 0.0)
         turn = 0.0 if abs(turn) < 1e-9 else turn
-        found.append(Placement(member.kind, room, member.geoms, position, turns % 4, footprint, assets, turn))
+        found.append(Placement(member.kind, room, member.geoms, position, turns % 4, assets, turn))
     return found
 
 

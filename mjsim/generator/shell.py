@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mjsim.generator.openings import LEAF_DEPTH, NARROW_SILL, wall_stretches
+from mjsim.generator.openings import LEAF_DEPTH, NARROW_SILL, gaps, wall_stretches
 from mjsim.generator.palette import WET
 from mjsim.generator.values import (
     CEILING_HEIGHT,
@@ -151,10 +151,8 @@ class _RoomShell:
             yield self._slab(side, (at, end), up, out, material)
 
     def _foot(self, side: Side, holes: list[_Hole]) -> Iterator[str]:
-        at, last = self._room.floor.wall(side)
-        for hole in [*(hole for hole in holes if hole.bottom == 0), _Hole(last, last, 0, 0)]:
-            start = at + 0.05 if at > self._room.floor.wall(side)[0] else at
-            end = hole.start - 0.05 if hole.start < last else last
+        doors = [(hole.start - 0.05, hole.end + 0.05) for hole in holes if hole.bottom == 0]
+        for start, end in gaps(*self._room.floor.wall(side), doors):
             if end - start > 0.1:
                 yield self._slab(side, (start, end), (0.0, 0.09), (-0.012, 0.0), "skirting", "trim")
                 x, y = self._room.floor.along(side, start, end, 0.0, 0.34).center
@@ -162,7 +160,6 @@ class _RoomShell:
                     f'<geom class="shadow" material="shadow_edge" pos="{_n(x)} {_n(y)} 0.002" '
                     f'size="{_n((end - start) / 2)} 0.17 0.1" euler="0 0 {_n(_SHADOW_TURN[side])}"/>'
                 )
-            at = hole.end
 
     def _window(self, window: Window) -> Iterator[str]:
         side, half = window.side, window.width / 2

@@ -208,7 +208,6 @@ class Placement:
     geoms: str
     position: tuple[float, float, float]
     quarter_turns: int
-    footprint: Rectangle | None  # covered floor, or None for pieces that hang or lie flat
     assets: tuple[Asset, ...] = ()
     turn: float = 0.0  # additional yaw in radians, for example of a chair at a desk
 

@@ -13,7 +13,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.compiled.footprint import outline_points
+from mjsim.house.compiled.footprint import bounding_boxes, outline_points
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.scene import avatar
 from mjsim.render.cameras import ViewVolume, look_rotation
@@ -115,11 +115,8 @@ def _bounds(model: Any, data: Any) -> tuple[NDArray[np.float64], NDArray[np.floa
     shown = np.isin(model.geom_group, FIRST_PERSON_GROUPS)
     if not shown.any():
         raise RenderError("a model without geoms in the groups 0 to 2 has no picture; add visual geoms")
-    rotations = data.geom_xmat.reshape(-1, 3, 3)[shown]
-    boxes = model.geom_aabb[shown]
-    centres = data.geom_xpos[shown] + np.einsum("gij,gj->gi", rotations, boxes[:, :3])
-    halves = np.einsum("gij,gj->gi", np.abs(rotations), boxes[:, 3:])
-    return (centres - halves).min(axis=0), (centres + halves).max(axis=0)
+    low, high = bounding_boxes(model, data, shown)
+    return low.min(axis=0), high.max(axis=0)
 
 
 def _framed(rasteriser: Rasteriser, view: ViewVolume, name: str) -> ViewVolume:
@@ -218,9 +215,8 @@ def _person_geoms(model: Any) -> NDArray[np.bool_]:
 def _overhead_geoms(model: Any, data: Any) -> NDArray[np.bool_]:
     """Return a mask of the static geoms above head height with free floor below them, such as lintels."""
     static = model.body_weldid[model.geom_bodyid] == 0
-    has_outline = model.geom_type > int(
-        mujoco.mjtGeom.mjGEOM_HFIELD
-    )  # all types but planes and height fields
+    # All types except planes and height fields have an outline.
+    has_outline = model.geom_type > int(mujoco.mjtGeom.mjGEOM_HFIELD)
     solid = np.flatnonzero(static & has_outline & np.isin(model.geom_group, TOP_DOWN_GROUPS))
     rotations = data.geom_xmat.reshape(-1, 3, 3)
     points = [outline_points(model, int(g), data.geom_xpos[g], rotations[g]) for g in solid]

@@ -16,7 +16,7 @@ import shutil
 import stat
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -131,6 +131,21 @@ def work_folder(parent: Path) -> Iterator[Path]:
         raise
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def write_folder(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write a new folder atomically. If another process has written it in the meantime, keep that version."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with work_folder(folder.parent) as work:
+        for name, content in files.items():
+            (work / name).parent.mkdir(exist_ok=True)
+            (work / name).write_bytes(content)
+        work.chmod(0o755)
+        try:
+            work.rename(folder)
+        except OSError:
+            if not all((folder / name).is_file() for name in files):
+                raise
 
 
 @functools.lru_cache(maxsize=64)  # each process scans a folder once a day

@@ -1,8 +1,9 @@
-"""Read TOML files, and find the line numbers of their keys."""
+"""Read and format TOML files, and find the line numbers of their keys."""
 
+import json
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,15 @@ def line_of(text: str, *keys: str) -> int | None:
             return found[0]
         keys = tuple(key[: max(key.rfind("."), key.rfind("["), 0)] for key in keys)
     return None
+
+
+def toml_tables(tables: Mapping[str, Mapping[str, object]]) -> str:
+    """Format named tables as TOML. Their values are texts, whole numbers, and lists of these."""
+    lines = []
+    for name, table in tables.items():
+        values = (f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in table.items())
+        lines += [f"[{name}]", *values, ""]
+    return "\n".join(lines)
 
 
 def joined_key(table: str, key: str) -> str:

@@ -13,6 +13,7 @@ _OTHERS = (house.MAP, vision.IN_VIEW, vision.RGB, vision.DEPTH, vision.SEGMENTAT
 
 SENSORS = {sensor.name: sensor for sensor in (*VECTORS, *_OTHERS)}
 BUNDLES = {"state": VECTORS}
+_CHOICES = {**BUNDLES, **{name: (sensor,) for name, sensor in SENSORS.items()}}
 
 
 def resolve_sensors(observations: Sequence[str | Sensor]) -> tuple[Sensor, ...]:
@@ -25,23 +26,11 @@ def resolve_sensors(observations: Sequence[str | Sensor]) -> tuple[Sensor, ...]:
         observations = (observations,)
     chosen: dict[str, Sensor] = {}
     for choice in observations:
-        for sensor in _resolve(choice):
+        if not isinstance(choice, Sensor) and choice not in _CHOICES:
+            raise EnvironmentConfigError(f"no sensor {choice!r}; choose from {[*_CHOICES]}, or pass a Sensor")
+        for sensor in (choice,) if isinstance(choice, Sensor) else _CHOICES[choice]:
             if chosen.setdefault(sensor.name, sensor) is not sensor:
                 raise EnvironmentConfigError(f"two different sensors are named {sensor.name!r}; rename one")
     if not chosen:
-        raise EnvironmentConfigError(f"observations is empty; choose from {_names()}")
+        raise EnvironmentConfigError(f"observations is empty; choose from {[*_CHOICES]}")
     return tuple(chosen.values())
-
-
-def _resolve(choice: str | Sensor) -> Sequence[Sensor]:
-    if isinstance(choice, Sensor):
-        return (choice,)
-    if choice in BUNDLES:
-        return BUNDLES[choice]
-    if choice in SENSORS:
-        return (SENSORS[choice],)
-    raise EnvironmentConfigError(f"no sensor {choice!r}; choose from {_names()}, or pass a Sensor")
-
-
-def _names() -> list[str]:
-    return [*BUNDLES, *SENSORS]

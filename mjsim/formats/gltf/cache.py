@@ -14,7 +14,7 @@ import mujoco
 from mjsim.formats.gltf.export import export_scene, floor_json
 from mjsim.formats.gltf.store import GZIP
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.support.files import remove_leftovers, replacing, source_digest, work_folder
+from mjsim.support.files import remove_leftovers, replacing, source_digest, write_folder
 from mjsim.support.kernels import UNUSED
 
 _LEVEL = 9
@@ -43,7 +43,7 @@ def cached_scene(catalogue: Catalogue, folder: Path) -> Path:
         with _locked(folder):
             if not target.is_dir():
                 remove_leftovers(folder, UNUSED, "")
-                _make(catalogue, folder, target)
+                write_folder(target, dict(_stored(*file) for file in export_scene(catalogue).items()))
     os.utime(target)  # marks the folder as recently used
     return target
 
@@ -67,17 +67,8 @@ def cached_floor(catalogue: Catalogue, scene: Path, body_radius: float) -> str:
     return name
 
 
-def _make(catalogue: Catalogue, folder: Path, target: Path) -> None:
-    with work_folder(folder) as work:
-        for name, content in export_scene(catalogue).items():
-            path = work / name
-            path.parent.mkdir(exist_ok=True)
-            if path.suffix in _COMPRESSED:
-                path.write_bytes(content)
-            else:
-                path.with_name(f"{path.name}{GZIP}").write_bytes(_compressed(content))
-        work.chmod(0o755)
-        work.rename(target)
+def _stored(name: str, content: bytes) -> tuple[str, bytes]:
+    return (name, content) if name.endswith(_COMPRESSED) else (f"{name}{GZIP}", _compressed(content))
 
 
 def _compressed(content: bytes) -> bytes:

@@ -56,10 +56,8 @@ class Glb:
         self._blob = bytearray()
         self._views: list[dict[str, Any]] = []
         self._accessors: list[dict[str, Any]] = []
-        self._images: list[dict[str, Any]] = []
-        self._textures: dict[tuple[int, bool], int] = {}
-        self._materials: list[dict[str, Any]] = []
-        self._material_ids: dict[MaterialKey, int] = {}
+        self._images: dict[tuple[int, bool], dict[str, Any]] = {}
+        self._materials: dict[MaterialKey, dict[str, Any]] = {}
         self._meshes: list[dict[str, Any]] = []
         self._nodes: list[dict[str, Any]] = []
         self.triangles = 0
@@ -70,8 +68,7 @@ class Glb:
         node = {"name": name, **properties}
         if children:
             node["children"] = list(children)
-        self._nodes.append(node)
-        return len(self._nodes) - 1
+        return _append(self._nodes, node)
 
     def mesh(
         self,
@@ -91,12 +88,9 @@ class Glb:
         low, extent = every.min(axis=0), float(np.ptp(every, axis=0).max())
         step = next((step for step in _STEPS if extent / step < 65535.0), extent / 65535.0)
         primitives = [self._primitive(key, groups[key], low, step) for key in sorted(groups)]
-        self._meshes.append(
-            {"name": name, "primitives": primitives, **({"extras": dict(marks)} if marks else {})}
-        )
-        return self.node(
-            name, mesh=len(self._meshes) - 1, translation=low.tolist(), scale=[step] * 3, **properties
-        )
+        mesh = {"name": name, "primitives": primitives, **({"extras": dict(marks)} if marks else {})}
+        number = _append(self._meshes, mesh)
+        return self.node(name, mesh=number, translation=low.tolist(), scale=[step] * 3, **properties)
 
     def _primitive(
         self, key: MaterialKey, group: Sequence[GeomSurface], origin: Floats, step: float
@@ -110,8 +104,9 @@ class Glb:
         normals = np.concatenate([s.normals for s in group])
         colours = np.repeat([linear(s.rgba) for s in group], counts, axis=0)
         shine = np.repeat([s.shine for s in group], counts, axis=0)
+        bounds = {"min": positions.min(axis=0).tolist(), "max": positions.max(axis=0).tolist()}
         attributes = {
-            "POSITION": self._attribute(positions, "VEC3", bounds=True),
+            "POSITION": self._attribute(positions, "VEC3", **bounds),
             "NORMAL": self._attribute(np.rint(normals * 127.0).astype("i1"), "VEC3", normalized=True),
             "COLOR_0": self._attribute(np.rint(colours * 65535.0).astype("u2"), "VEC4", normalized=True),
             "_SHINE": self._attribute(np.rint(shine * 255.0).astype("u1"), "VEC3", normalized=True),
@@ -121,16 +116,14 @@ class Glb:
             attributes["TEXCOORD_0"] = self._attribute(
                 (np.rint(uv / _UV_STEP) * _UV_STEP).astype("f4"), "VEC2"
             )
-        kind = "u2" if starts[-1] < 65535 else "u4"
         self.triangles += len(triangles) // 3
         self.primitives += 1
-        indices = self._accessor(
-            triangles.astype(kind), self._view(triangles.astype(kind).tobytes(), _TRIANGLES), "SCALAR"
-        )
+        corners = triangles.astype("u2" if starts[-1] < 65535 else "u4")
+        indices = self._accessor(corners, self._view(corners.tobytes(), target=_TRIANGLES), "SCALAR")
         return {"attributes": attributes, "indices": indices, "material": self._material(key)}
 
     def _material(self, key: MaterialKey) -> int:
-        if key not in self._material_ids:
+        if key not in self._materials:
             pbr: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 1.0}
             material: dict[str, Any] = {"name": "plain", "pbrMetallicRoughness": pbr}
             if key.texture >= 0:
@@ -138,58 +131,35 @@ class Glb:
                 material["name"] = self._image(key.texture, key.is_translucent)[0]
             if key.is_translucent:
                 material |= {"alphaMode": "BLEND", "extras": {"decal": key.is_decal}}
-            self._materials.append(material)
-            self._material_ids[key] = len(self._materials) - 1
-        return self._material_ids[key]
+            self._materials[key] = material
+        return list(self._materials).index(key)
 
     def _texture(self, texture: int, alpha: bool) -> int:
         key = (texture, alpha)
-        if key not in self._textures:
+        if key not in self._images:
             name, encoded = self._image(*key)
-            self._images.append({"name": name, "mimeType": "image/webp", "bufferView": self._view(encoded)})
-            self._textures[key] = len(self._images) - 1
-        return self._textures[key]
+            self._images[key] = {"name": name, "mimeType": "image/webp", "bufferView": self._view(encoded)}
+        return list(self._images).index(key)
 
-    def _attribute(
-        self, values: NDArray[Any], kind: str, *, normalized: bool = False, bounds: bool = False
-    ) -> int:
+    def _attribute(self, values: NDArray[Any], kind: str, **properties: Any) -> int:
         """Add an accessor for vertex values (n, k), which are aligned to 4 bytes. Return its index."""
         width = values.shape[1] * values.itemsize
         stride = -(-width // 4) * 4
         padded = np.zeros((len(values), stride // values.itemsize), values.dtype)
         padded[:, : values.shape[1]] = values
-        view = self._view(padded.tobytes(), _VERTICES, stride)
-        accessor = self._accessor(values, view, kind)
-        if normalized:
-            self._accessors[accessor]["normalized"] = True
-        if bounds:
-            self._accessors[accessor] |= {
-                "min": values.min(axis=0).tolist(),
-                "max": values.max(axis=0).tolist(),
-            }
-        return accessor
+        view = self._view(padded.tobytes(), target=_VERTICES, byteStride=stride)
+        return self._accessor(values, view, kind, **properties)
 
-    def _accessor(self, values: NDArray[Any], view: int, kind: str) -> int:
-        self._accessors.append(
-            {
-                "bufferView": view,
-                "componentType": _COMPONENTS[values.dtype],
-                "count": len(values),
-                "type": kind,
-            }
-        )
-        return len(self._accessors) - 1
+    def _accessor(self, values: NDArray[Any], view: int, kind: str, **properties: Any) -> int:
+        about = {"bufferView": view, "componentType": _COMPONENTS[values.dtype], "count": len(values)}
+        return _append(self._accessors, {**about, "type": kind, **properties})
 
-    def _view(self, content: bytes, target: int | None = None, stride: int | None = None) -> int:
+    def _view(self, content: bytes, **properties: int) -> int:
         self._blob += b"\0" * (-len(self._blob) % 4)
-        view = {"buffer": 0, "byteOffset": len(self._blob), "byteLength": len(content)}
-        if target is not None:
-            view["target"] = target
-        if stride is not None:
-            view["byteStride"] = stride
+        start = len(self._blob)
         self._blob += content
-        self._views.append(view)
-        return len(self._views) - 1
+        view = {"buffer": 0, "byteOffset": start, "byteLength": len(content), **properties}
+        return _append(self._views, view)
 
     def content(self, root: int) -> bytes:
         """Return the content of the GLB file, whose scene has a single root node."""
@@ -197,12 +167,12 @@ class Glb:
         lists: Mapping[str, Any] = {
             "nodes": self._nodes,
             "meshes": self._meshes,
-            "materials": self._materials,
+            "materials": list(self._materials.values()),
             "textures": [
                 {"sampler": 0, "extensions": {_EXTENSIONS["texture"]: {"source": number}}}
                 for number in range(len(self._images))
             ],
-            "images": self._images,
+            "images": list(self._images.values()),
             "samplers": [sampler] if self._images else [],
             "bufferViews": self._views,
             "accessors": self._accessors,
@@ -225,6 +195,11 @@ class Glb:
         if blob:
             chunks += struct.pack("<II", len(blob), 0x004E4942) + blob
         return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+
+
+def _append(elements: list[dict[str, Any]], element: dict[str, Any]) -> int:
+    elements.append(element)
+    return len(elements) - 1
 
 
 def linear(rgba: Floats) -> Floats:

@@ -21,7 +21,8 @@ from mjsim.generator.values import WALL
 from mjsim.support.files import read_json, read_text
 from mjsim.values.errors import AssetError, brief
 
-NAMES = "mjsim_rooms"  # metadata key of houses exported by mjsim; maps room ids to [key, label]
+# Metadata key of exported houses for a mapping from room ids to [key, label]. ProcTHOR has only four room types.
+NAMES = "mjsim_rooms"
 # Names of room types that are not written in camel case.
 _TYPES = {"livingroom": "living_room"}
 

@@ -7,11 +7,10 @@ by the ProcTHOR assets with the closest size.
 from collections.abc import Iterator
 from typing import Any
 
+from mjsim.formats.procthor.plan import NAMES
 from mjsim.generator.openings import wall_stretches
 from mjsim.generator.values import CEILING_HEIGHT, SIDES, WALL, Door, HomePlan, Room, Side, Window, opposite
 
-# Metadata key for a mapping from room ids to [key, label], because ProcTHOR has only four room types.
-NAMES = "mjsim_rooms"
 _TYPES = {"kitchen": "Kitchen", "bathroom": "Bathroom", "shower_room": "Bathroom", "bedroom": "Bedroom"}
 # ProcTHOR assets for doors and for passages. Doors wider than _WIDE metres become passages.
 _DOOR, _PASSAGE, _WIDE = "Doorway_2", "Doorframe_Double_2", 1.2

@@ -1,17 +1,15 @@
 """Compute the bounding boxes of the drawn geoms of furniture from their MJCF elements."""
 
-import math
 import xml.etree.ElementTree as ET
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 Boxes = NDArray[np.float64]  # rows of x0, y0, z0, x1, y1, z1 in metres, shape (n, 6)
 _HIDDEN = ("guard", "shadow")  # default classes of geoms that are not drawn as solids
-_AXES = {
-    "x": "0 1 0 0 0 1",
-    "y": "1 0 0 0 0 1",
-}  # axes of the default classes for walls, by the end of their names
+# Axes of the default classes for walls, by the end of their names.
+_AXES = {"x": "0 1 0 0 0 1", "y": "1 0 0 0 0 1"}
 
 
 def drawn_boxes(geoms: str) -> Boxes:
@@ -48,10 +46,4 @@ def _rotation(geom: ET.Element) -> NDArray[np.float64] | None:
         return np.array([[a, d, b * f - c * e], [b, e, c * d - a * f], [c, f, a * e - b * d]])
     if geom.get("euler") is None:
         return None
-    turn = np.eye(3)
-    for axis, angle in enumerate(_numbers(geom, "euler").tolist()):
-        u, v, step = (axis + 1) % 3, (axis + 2) % 3, np.eye(3)
-        step[u, u] = step[v, v] = math.cos(angle)
-        step[u, v], step[v, u] = -math.sin(angle), math.sin(angle)
-        turn = turn @ step  # Euler angles are intrinsic rotations about x, y and z.
-    return turn
+    return np.asarray(Rotation.from_euler("XYZ", _numbers(geom, "euler")).as_matrix())

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 import shapely
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import ConvexHull, QhullError
 
@@ -89,6 +89,16 @@ def outline_points(
         f"geom {_name(model, geom)} is of type {_GEOM(kind).name}, whose outline is not known; "
         "build it from primitives or meshes"
     )
+
+
+def bounding_boxes(
+    model: mujoco.MjModel, data: mujoco.MjData, geoms: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the lower and upper corners of the bounding boxes of n geoms in metres, each of shape (n, 3)."""
+    rotations, boxes = data.geom_xmat[geoms].reshape(-1, 3, 3), model.geom_aabb[geoms]
+    middle = data.geom_xpos[geoms] + np.einsum("gij,gj->gi", rotations, boxes[:, :3])
+    half = np.einsum("gij,gj->gi", np.abs(rotations), boxes[:, 3:])
+    return middle - half, middle + half
 
 
 def _ellipsoid(centre: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArray[np.float64]:

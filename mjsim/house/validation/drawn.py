@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.house.compiled.footprint import bounding_boxes
 from mjsim.house.validation.checked_model import Compiled
 
 SLACK = 0.004  # depth by which drawn bodies may overlap, such as table legs on a rug, in metres
@@ -35,7 +36,7 @@ class DrawnFault:
 def overlaps(compiled: Compiled) -> list[DrawnFault]:
     """Find drawn geoms of different bodies that overlap by more than `SLACK`. Walls may overlap each other."""
     model, geoms = compiled.model, _drawn(compiled)
-    low, high = _boxes(compiled, geoms)
+    low, high = bounding_boxes(model, compiled.data, geoms)
     bodies = model.geom_bodyid[geoms]
     shell = np.array([model.body(b).name.rpartition("/")[2] in SHELL for b in bodies.tolist()], bool)
     shared = np.minimum(high[:, None], high) - np.maximum(low[:, None], low)
@@ -57,10 +58,9 @@ def coplanar_faces(compiled: Compiled) -> list[DrawnFault]:
     model, geoms = compiled.model, _drawn(compiled)
     geoms = geoms[model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_BOX]
     geoms = geoms[np.abs(compiled.data.geom_xmat[geoms]).reshape(-1, 3, 3).max(axis=1).min(axis=1) > 1 - 1e-6]
-    low, high = _boxes(compiled, geoms)
-    textured = np.append(
-        (model.mat_texid >= 0).any(axis=1), False
-    )  # the last row is for geoms without material
+    low, high = bounding_boxes(model, compiled.data, geoms)
+    # The last row is for geoms without material.
+    textured = np.append((model.mat_texid >= 0).any(axis=1), False)
     paint = np.column_stack([model.geom_matid[geoms], model.geom_rgba[geoms]])
     alike = ~textured[model.geom_matid[geoms]] & (paint[:, None] == paint).all(axis=2)
     found = []
@@ -95,14 +95,6 @@ def _drawn(compiled: Compiled) -> NDArray[np.intp]:
     """Return the ids of all drawn geoms except planes, which are contact shadows."""
     planes = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
     return compiled.shown[~np.isin(compiled.model.geom_type[compiled.shown], planes)]
-
-
-def _boxes(compiled: Compiled, geoms: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """Return the lower and upper corners of the bounding boxes of geoms, in metres, each of shape (n, 3)."""
-    turns, boxes = compiled.data.geom_xmat[geoms].reshape(-1, 3, 3), compiled.model.geom_aabb[geoms]
-    middle = compiled.data.geom_xpos[geoms] + np.einsum("gij,gj->gi", turns, boxes[:, :3])
-    half = np.einsum("gij,gj->gi", np.abs(turns), boxes[:, 3:])
-    return middle - half, middle + half
 
 
 def _samples(rectangle: tuple[Floats, Floats], axis: int, at: float) -> Iterator[Floats]:

@@ -105,15 +105,13 @@ def read_rooms(path: Path) -> tuple[NamedRoom, ...]:
 
 def find_rooms(grid: FloorGrid, given: Sequence[NamedRoom], pieces: Sequence[ScenePiece]) -> Rooms:
     """Divide the reachable floor into rooms. Raise an AssetError if the given rooms cover none of it."""
+    region = grid.indoors & ~(grid.walls & ~grid.doors)
     if given:
         seeds, reason = _seeds_of(grid, given), "given"
-        names = [(room.key, room.label) for room in given]
     else:
-        open_floor = grid.indoors & ~grid.walls
-        seeds = _parted(open_floor)
-        names = []
+        seeds = _parted(grid.indoors & ~grid.walls)
         reason = f"separated where the way is at most {2 * _NARROW[0]} m wide, halls where it is wider"
-    grown = _grown(seeds, grid.indoors & ~(grid.walls & ~grid.doors))
+    grown = _grown(seeds, region)
     kept = [
         n
         for n in range(1, int(grown.max()) + 1)
@@ -126,10 +124,10 @@ def find_rooms(grid: FloorGrid, given: Sequence[NamedRoom], pieces: Sequence[Sce
         seeds, kept, reason = grid.walkable.astype(np.int32), [1], "one room"
     numbered = np.zeros(int(seeds.max()) + 1, np.int32)
     numbered[kept] = np.arange(1, len(kept) + 1)
-    region = grid.indoors & ~(grid.walls & ~grid.doors)
     floor = _grown(numbered[seeds], region)
     labels = _within_walls(floor)
-    names = [names[n - 1] for n in kept] if given else _names(labels, len(kept), grid, pieces)
+    given_names = [(given[n - 1].key, given[n - 1].label) for n in kept if given]
+    names = given_names or _names(labels, len(kept), grid, pieces)
     return Rooms(tuple(names), labels, floor > 0, reason)
 
 

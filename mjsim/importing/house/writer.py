@@ -1,6 +1,5 @@
 """Write the files of an imported house. Equal houses always give identical files."""
 
-import json
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +17,8 @@ from mjsim.importing.house.drawn_meshes import DrawnMesh, picture_key
 from mjsim.importing.house.floor_grid import FloorGrid
 from mjsim.importing.house.rooms import Rooms
 from mjsim.importing.house.solids import Solid
-from mjsim.importing.object.model_writer import comment, obj_lines, write_png
+from mjsim.importing.object.model_writer import comment, numbers, obj_lines, write_png
+from mjsim.support.toml import toml_tables
 
 MODEL = "house.xml"
 MESHES = "meshes"
@@ -68,7 +68,7 @@ def write_house(house: ImportedHouse, folder: Path, catalogue: Catalogue) -> Pat
     ]
     (folder / MODEL).write_text("\n".join(lines) + "\n", encoding="utf-8")
     path = folder / CATALOGUE
-    path.write_text("\n".join(_catalogue(house, catalogue)) + "\n", encoding="utf-8")
+    path.write_text(_catalogue(house, catalogue) + "\n", encoding="utf-8")
     return path
 
 
@@ -156,32 +156,29 @@ def _sites(house: ImportedHouse) -> Iterator[str]:
 
 
 def _box(name: str, low: Floats, high: Floats) -> str:
-    return f'<geom class="solid" name="{name}" pos="{_numbers((low + high) / 2)}" size="{_numbers((high - low) / 2)}"/>'
+    middle, half = numbers((low + high) / 2, 5), numbers((high - low) / 2, 5)
+    return f'<geom class="solid" name="{name}" pos="{middle}" size="{half}"/>'
 
 
-def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> Iterator[str]:
+def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> str:
     bins = {place.key: place for place in house.bins}
     categories = [c for c in catalogue.categories.values() if c.receptacle in bins]
     objects = [key for category in categories for key in category.objects]
-    tables: list[tuple[str, dict[str, object]]] = [
-        ("house", {"label": house.label, "model": MODEL}),
-        ("rooms", dict(house.rooms.names)),
-    ]
-    tables += [
-        (f"categories.{c.key}", {"label": c.label, "receptacle": c.receptacle, "objects": list(c.objects)})
-        for c in categories
-    ]
+    tables: dict[str, dict[str, object]] = {
+        "house": {"label": house.label, "model": MODEL},
+        "rooms": dict(house.rooms.names),
+    }
+    for c in categories:
+        own = {"label": c.label, "receptacle": c.receptacle}
+        tables[f"categories.{c.key}"] = {**own, "objects": list(c.objects)}
     for key, found in bins.items():
         known = catalogue.receptacles[key]
         place = {"place": found.place, "room": found.room}
-        tables.append((f"receptacles.{key}", {"label": known.label, **place, "model": _relative(known.path)}))
+        tables[f"receptacles.{key}"] = {"label": known.label, **place, "model": _relative(known.path)}
     for key in objects:
         item = catalogue.objects[key]
-        tables.append((f"objects.{key}", {"label": item.label, "model": _relative(item.path)}))
-    for name, values in tables:
-        yield f"[{name}]"
-        yield from (f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in values.items())
-        yield ""
+        tables[f"objects.{key}"] = {"label": item.label, "model": _relative(item.path)}
+    return toml_tables(tables)
 
 
 def _relative(path: Path) -> str:
@@ -192,7 +189,3 @@ def _relative(path: Path) -> str:
 
 def _name(text: str) -> str:
     return re.sub(r"[^A-Za-z0-9_]+", "_", text).strip("_")[:40] or "thing"
-
-
-def _numbers(values: Floats | Sequence[float]) -> str:
-    return " ".join(f"{value:.6g}" for value in np.round(values, 5) + 0.0)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
+from trimesh.convex import convex_hull
 
 from mjsim.formats.scene.surface import Floats
 from mjsim.house.validation.object_rules import MASS
@@ -41,7 +42,7 @@ def close(mesh: trimesh.Trimesh) -> ClosedBody:
     if whole is not None:
         return ClosedBody(whole, count)
     if count > MAX_PIECES:
-        return ClosedBody(_hull(mesh.vertices), count, hulled=count, open_share=1.0)
+        return ClosedBody(convex_hull(mesh.vertices), count, hulled=count, open_share=1.0)
     return _piecewise(mesh)
 
 
@@ -66,9 +67,8 @@ def _as_it_is(mesh: trimesh.Trimesh) -> trimesh.Trimesh | None:
     if whole.volume < 0:
         whole.invert()
     shells = whole.split(only_watertight=False, repair=False) if whole.body_count > 1 else []
-    overlapping = sum(shell.volume > 0 for shell in shells) > 1 or any(s.volume < 0 for s in shells)
     # Nested shells may be cavities or inverted pieces. Accept them only if there is a single outer shell.
-    return None if overlapping and not _is_hollow(shells) else whole if whole.volume > 0 else None
+    return whole if whole.volume > 0 and (not shells or _is_hollow(shells)) else None
 
 
 def _is_hollow(shells: list[trimesh.Trimesh]) -> bool:
@@ -90,7 +90,7 @@ def _piecewise(mesh: trimesh.Trimesh) -> ClosedBody:
         elif np.sort(_spread(piece.vertices)[0])[1] > _FLAT:  # Leave out pieces that are only lines.
             hulled += 1
             area += piece.area
-            body = _thickened_sheet(piece.vertices) or _hull(piece.vertices)
+            body = _thickened_sheet(piece.vertices) or convex_hull(piece.vertices)
         closed.append(body)
     share = area / float(sum(piece.area for piece in pieces))
     return ClosedBody(
@@ -121,17 +121,13 @@ def _union(bodies: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     return whole if whole.is_volume else trimesh.util.concatenate(bodies)
 
 
-def _hull(points: Floats) -> trimesh.Trimesh:
-    return trimesh.convex.convex_hull(points)
-
-
 def _thickened_sheet(points: Floats) -> trimesh.Trimesh | None:
     """Return a thin slab around points (n, 3), or None if the points are not in a plane."""
     spread, axes = _spread(points)
     if spread[2] > _FLAT:
         return None
     normal = axes[2] * SHEET / 2
-    return _hull(np.concatenate((points - normal, points + normal)))
+    return convex_hull(np.concatenate((points - normal, points + normal)))
 
 
 def _spread(points: Floats) -> tuple[Floats, Floats]:

@@ -18,7 +18,7 @@ from mjsim.house.catalogue.house_ref import CATALOGUE, parse_house
 from mjsim.house.compiled.house import compiled_house
 from mjsim.importing.object.model_writer import MODEL
 from mjsim.support.files import exchange, read_text, work_folder, write_text_atomically
-from mjsim.support.toml import parse_toml
+from mjsim.support.toml import parse_toml, toml_tables
 from mjsim.values.errors import AssetError
 
 HELD = 4  # minimum number of identical objects that must fit into a bin
@@ -27,7 +27,6 @@ MAX_LABEL = 40
 _UNNAMED = ".unnamed"  # name of a file that marks an object that is not in the catalogue yet
 _WALL_GAP = 0.02  # gap between an object and the walls of its bin, in metres
 _HEADER = "# Objects that a house has in addition. Run in it with --house and the path of this file.\nextends = {}\n"
-_ENTRY = "\n[objects.{key}]\nlabel = {label}\ncategory = {category}\nmodel = {model}\n"
 
 
 @dataclass(frozen=True)
@@ -153,11 +152,9 @@ class HouseExtension:
 
     def _with(self, entry: CatalogueEntry) -> str:
         values = {"label": entry.label, "category": entry.category, "model": f"{entry.key}/{MODEL}"}
-        encoded = {key: json.dumps(value, ensure_ascii=False) for key, value in values.items()}
-        block = _ENTRY.format(key=entry.key, **encoded)
         table = rf"^\[objects\.{entry.key}\][^\n]*\n(?:(?!\[).*\n?)*"
         kept = re.sub(table, "", self._text, flags=re.MULTILINE)
-        return kept.rstrip("\n") + "\n" + block
+        return kept.rstrip("\n") + "\n\n" + toml_tables({f"objects.{entry.key}": values})
 
 
 def held_in(room: Floats, size: Floats) -> int:

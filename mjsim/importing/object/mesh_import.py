@@ -57,23 +57,12 @@ def _prepare(spec: mujoco.MjSpec, shown: int) -> None:
 
 
 def _add_arrow(body: Any, site: Any, colour: tuple[float, ...]) -> None:
-    turn = np.zeros(4)
-    if site.alt.type == mujoco.mjtOrientation.mjORIENTATION_EULER:
-        turn[:] = np.cos(site.alt.euler[2] / 2), 0.0, 0.0, np.sin(site.alt.euler[2] / 2)
-    else:
-        turn[:] = site.quat
-    tip = np.zeros(3)
-    mujoco.mju_rotVecQuat(tip, np.array([_ARROW, 0.0, 0.0]), turn)
-    start = np.array([*site.pos[:2], site.pos[2] + 0.004])
-    for kind, size, ends in (
-        (mujoco.mjtGeom.mjGEOM_CAPSULE, [0.0025, 0.0, 0.0], (*start, *(start + tip))),
-        (mujoco.mjtGeom.mjGEOM_SPHERE, [0.005, 0.0, 0.0], None),
-    ):
-        geom = body.add_geom(type=kind, size=size, rgba=colour, group=_LOOK, contype=0, conaffinity=0)
-        if ends is None:
-            geom.pos = start + tip
-        else:
-            geom.fromto = ends
+    yaw = site.alt.euler[2]
+    start = site.pos + np.array([0.0, 0.0, 0.004])
+    tip = start + _ARROW * np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    look = {"rgba": colour, "group": _LOOK, "contype": 0, "conaffinity": 0}
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[0.0025, 0.0, 0.0], fromto=[*start, *tip], **look)
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.005, 0.0, 0.0], pos=tip, **look)
 
 
 def _on_white(rgba: NDArray[np.uint8]) -> NDArray[np.uint8]:

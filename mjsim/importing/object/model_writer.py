@@ -67,11 +67,11 @@ def _mjcf(item: ImportedObject, key: str, label: str, source: str) -> str:
         source=comment(source),
         friction=_ROLLING if item.rolls else "1 0.02 0.002",
         assets="\n".join(f"    {line}" for line in _assets(item, key)),
-        centre=_numbers(weight.centre),
+        centre=numbers(weight.centre),
         mass=f"{weight.mass:.6g}",
         inertia=" ".join(f"{value:.6g}" for value in corner),
         geoms="\n".join(f"      {line}" for line in _geoms(item, key)),
-        grip=_numbers(item.grip.point),
+        grip=numbers(item.grip.point),
         yaw=item.grip.yaw,
         opposite=item.grip.yaw + math.pi,
     )
@@ -122,8 +122,9 @@ def write_png(path: Path, rgb: NDArray[np.uint8]) -> None:
     path.write_bytes(data.tobytes())
 
 
-def _numbers(values: Floats) -> str:
-    return " ".join(f"{value:.6g}" for value in np.round(values, 7) + 0.0)
+def numbers(values: Floats, digits: int = 7) -> str:
+    """Format numbers for MJCF, rounded to a number of decimals."""
+    return " ".join(f"{value:.6g}" for value in np.round(values, digits) + 0.0)
 
 
 def comment(text: str) -> str:

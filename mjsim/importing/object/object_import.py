@@ -123,18 +123,15 @@ def _extent(surface: Surface) -> tuple[float, Floats]:
 
 def _into_place(rotation: Floats, points: Floats) -> Floats:
     low, high = points.min(axis=0), points.max(axis=0)
-    transform = np.eye(4)
+    transform: Floats = translation_matrix((-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]))
     transform[:3, :3] = rotation
-    transform[:3, 3] = -(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]
     return transform
 
 
 def _on_the_floor(surface: Surface, transform: Floats) -> tuple[Surface, trimesh.Trimesh]:
     """Move a surface into place, with its lowest point on the floor even if its parts were thickened."""
     placed = surface.moved(transform)
-    down = np.eye(4)
-    down[2, 3] = -placed.corners[..., 2].min()
-    placed = placed.moved(down)
+    placed = placed.moved(translation_matrix((0, 0, -placed.corners[..., 2].min())))
     return placed, placed.mesh()
 
 

@@ -18,12 +18,11 @@ _GUTTER = 2  # margin around a triangle that keeps colours from bleeding, in pix
 _SHRINK = 0.93  # factor by which the scale is reduced until all triangles fit into the image
 _MIN_SIDE = 2  # minimum width of a triangle in the texture, in pixels
 MAX_TRIANGLES = 1400
-_SAMPLES = 200_000  # number of surface points at which colours are sampled
+_SAMPLES = 200_000  # number of random surface points at which colours are sampled
 _FACING = 0.01  # weight of normals in the search for the nearest surface point, in metres
 _CREASE = math.radians(40.0)
 _SHEET = 2e-4  # distance between the two sides of an open surface, in metres
 _PLAIN = 3 / 255  # maximum difference of colours that count as equal
-_GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # steps of the R2 sequence (Roberts, 2018)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +51,8 @@ class Atlas:
         """Return the triangle (k,) and the barycentric coordinates (k, 3) of each pixel, block by block."""
         faces = np.repeat(np.arange(len(self.blocks)), np.prod(self.blocks[:, 2:], axis=1))
         pixels = self._pixels() - self.blocks[faces, :2] + 0.5
-        a, b, c = (self.shapes[faces, k] for k in range(3))
-        whole = _cross(b - a, c - a)
-        second, third = _cross(pixels - a, c - a) / whole, _cross(b - a, pixels - a) / whole
-        weights = np.clip(np.column_stack((1 - second - third, second, third)), 0.0, 1.0)
-        return faces, weights / weights.sum(axis=1, keepdims=True)
+        flat = np.pad(self.shapes[faces], ((0, 0), (0, 0), (0, 1)))
+        return faces, _projected(flat, np.pad(pixels, ((0, 0), (0, 1))))
 
     def picture(self, colours: Floats) -> NDArray[np.uint8]:
         """Create an image (SIDE, SIDE, 3) from the colours (k, 3) of all `texels`, as RGB from 0 to 1."""
@@ -112,10 +108,6 @@ def _shelves(flat: Floats, scale: float) -> Ints | None:
     return blocks
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-
-
 @dataclass(frozen=True, eq=False)
 class VisualMesh:
     """A triangle mesh with normals, and with a texture or a single colour."""
@@ -139,7 +131,7 @@ def make_visual_mesh(surface: Surface, mesh: trimesh.Trimesh) -> VisualMesh:
     coarse.fix_normals(multibody=True)
     vertices, faces = np.asarray(coarse.vertices), np.asarray(coarse.faces)
     normals = corner_normals(vertices, faces)
-    colour, uv, picture = _painted(surface, vertices[faces])
+    colour, uv, picture = _painted(surface, mesh, vertices[faces])
     if not closed:
         faces = np.concatenate((faces, faces[:, ::-1] + len(vertices)))
         vertices = np.concatenate((vertices, vertices - _SHEET * coarse.vertex_normals))
@@ -149,38 +141,24 @@ def make_visual_mesh(surface: Surface, mesh: trimesh.Trimesh) -> VisualMesh:
 
 
 def _painted(
-    surface: Surface, corners: Floats
+    surface: Surface, mesh: trimesh.Trimesh, corners: Floats
 ) -> tuple[tuple[float, float, float], Floats | None, NDArray[np.uint8] | None]:
-    triangles, weights = _sampled(surface)
-    colours = surface.colours_at(triangles, weights)
+    sampled, triangles = trimesh.sample.sample_surface(mesh, _SAMPLES, seed=0)
+    colours = surface.colours_at(triangles, _projected(surface.corners[triangles], sampled))
     red, green, blue = np.clip(colours.mean(axis=0), 0.0, 1.0).round(4).tolist()
     if np.ptp(colours, axis=0).max() <= _PLAIN:
         return (red, green, blue), None, None
     atlas = Atlas.pack(corners)
-    near = scipy.spatial.cKDTree(_positions(surface, triangles, weights))
+    near = scipy.spatial.cKDTree(_with_normals(sampled, surface.corners, triangles))
     faces, inside = atlas.texels()
     points = np.einsum("kc,kcd->kd", inside, corners[faces])
-    normals = _normals(corners)[faces]
-    found = triangles[near.query(np.concatenate((points, _FACING * normals), axis=1))[1]]
+    found = triangles[near.query(_with_normals(points, corners, faces))[1]]
     baked = surface.colours_at(found, _projected(surface.corners[found], points))
     return (red, green, blue), atlas.uv, atlas.picture(baked)
 
 
-def _sampled(surface: Surface) -> tuple[Ints, Floats]:
-    """Sample points evenly on a surface. Return their triangles (k,) and barycentric coordinates (k, 3)."""
-    edges = np.diff(surface.corners, axis=1)
-    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-    count = np.ceil(_SAMPLES * area / area.sum()).astype(int)
-    triangles = np.repeat(np.arange(len(surface)), count)
-    u, v = ((np.arange(1, len(triangles) + 1)[:, None] * _GOLDEN) % 1.0).T
-    beyond = u + v > 1
-    u, v = np.where(beyond, 1 - u, u), np.where(beyond, 1 - v, v)
-    return triangles, np.column_stack((1 - u - v, u, v))
-
-
-def _positions(surface: Surface, triangles: Ints, weights: Floats) -> Floats:
-    points = np.einsum("kc,kcd->kd", weights, surface.corners[triangles])
-    return np.concatenate((points, _FACING * _normals(surface.corners)[triangles]), axis=1)
+def _with_normals(points: Floats, corners: Floats, triangles: Ints) -> Floats:
+    return np.concatenate((points, _FACING * _normals(corners)[triangles]), axis=1)
 
 
 def corner_normals(vertices: Floats, faces: Ints) -> Floats:
