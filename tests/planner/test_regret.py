@@ -3,15 +3,17 @@
 import dataclasses
 import threading
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planning_cases import optimum, random_problem
 
+from planner import regret
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.problem import after, possible_next
-from planner.regret import regrets
+from planner.regret import costs_by_pass, regrets
 from planner.solvers import SolveLimit, solver
 
 seeds = st.integers(0, 2**32 - 1)
@@ -113,6 +115,22 @@ def test_equal_visits_have_equal_regrets():
     twin = dataclasses.replace(one, shipments=(*one.shipments, one.shipments[2]), names=())
     by_shipment = {twin.number[r.visit.object]: r.regret for r in regrets(twin, TABLE)}
     assert by_shipment[2] == by_shipment[5]
+
+
+def test_a_pass_that_is_too_large_is_repeated_with_half_the_radius(monkeypatch):
+    """The first two passes are made to fail."""
+    problem, longest = random_problem(1, 8), []
+    first = PASS.solve(problem)
+
+    def limited(*arguments):
+        longest.append(arguments[3])
+        return (None, 0) if len(longest) <= 2 else costs_by_pass(*arguments)
+
+    monkeypatch.setattr(regret, "costs_by_pass", limited)
+    found = regrets(problem, PASS, radius=4.0)
+    assert all(r.proven for r in found)
+    over = np.array(longest) * problem.integers.unit - first.cost
+    assert over == pytest.approx([4.0, 2.0, 1.0], abs=0.01)
 
 
 def test_a_negative_radius_and_an_impossible_visit_are_refused():

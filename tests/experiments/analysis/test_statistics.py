@@ -360,6 +360,20 @@ def test_the_interval_by_house_leaves_out_what_all_conditions_of_a_house_share(s
         differences_by_house(values[:4], condition[:4], np.full(4, 6), houses[:4], ["a", "b"])
 
 
+@pytest.mark.parametrize("houses", [4, 5])
+def test_a_mixed_model_needs_five_levels_of_a_factor(houses):
+    rng, house = np.random.default_rng(4), np.repeat(np.arange(houses), 20)
+    condition, values = (
+        np.tile([*"ab"], 10 * houses),
+        rng.normal(size=20 * houses) + rng.normal(size=houses)[house],
+    )
+    if houses == 5:
+        assert set(mixed_model(values, condition, np.full(100, 6), {"house": house}).random) == {"house"}
+        return
+    with pytest.raises(StatisticsError, match="at least 5 levels of house; there are 4"):
+        mixed_model(values, condition, np.full(80, 6), {"house": house})
+
+
 def test_factors_that_the_design_cannot_tell_apart_are_refused():
     rng, people = np.random.default_rng(0), np.repeat(np.arange(20), 4)
     condition, levels = np.tile([*"ab"], 40), np.full(80, 6)

@@ -214,6 +214,23 @@ def test_who_people_are_is_forgotten_by_date(served, tmp_path, capsys):
     assert capsys.readouterr().out.splitlines()[-3:] == lines
 
 
+def test_a_host_forgets_participants_whose_runs_it_has_and_those_without_runs(served, tmp_path):
+    visits = tmp_path / "served" / "visits"
+    (visits / ("a" * 64)).rename(tmp_path / "another-host")
+    with closing(sqlite3.connect(tmp_path / "served" / "study.db")) as database, database:
+        database.execute("DELETE FROM trial WHERE person_id = 2")
+
+    async def forget():
+        store = await _open(served)
+        try:
+            with at(utc_now() + datetime.timedelta(days=31)):
+                return await forget_old(store, visits, 30)
+        finally:
+            await store.close()
+
+    assert asyncio.run(forget()).forgotten == ("p00002", "p00003")
+
+
 def test_forgetting_that_was_interrupted_is_finished_later(served, tmp_path, monkeypatch):
     async def stopped(*_):
         raise KeyboardInterrupt
