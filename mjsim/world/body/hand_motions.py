@@ -72,7 +72,9 @@ def _reach(person: Person, hand: int, item: int, grip: int) -> Steps:
 def _lift(person: Person, hand: int, goal: NDArray[np.float64], pitch: float) -> Steps:
     for _ in range(person.steps(person.motion.align_time)):
         yield
-    for _ in person.swing(hand, lambda: goal, person.steps(person.motion.lift_time), UP_FIRST):
+    # An object on a high shelf leaves the shelf before it moves down.
+    order = UP_FIRST if goal[2] > person.rig.hand_targets[hand, 2] else ACROSS_FIRST
+    for _ in person.swing(hand, lambda: goal, person.steps(person.motion.lift_time), order):
         person.look_towards(pitch)
         yield
 

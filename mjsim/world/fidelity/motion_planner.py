@@ -75,7 +75,8 @@ class MotionPlanner:
         self._move(self._hand_position, self._steps(self._times.align_time))
         body_motion = BodyMotion(kinematic.body, kinematic.body[FORWARD:], kinematic.model.clearance)
         goal = self._full.carrying.carry_position(self._hand, item, body_motion)
-        self._move(goal, self._steps(self._times.lift_time), UP_FIRST, _towards(pitch))
+        order = UP_FIRST if goal[2] > self._hand_position[2] else ACROSS_FIRST
+        self._move(goal, self._steps(self._times.lift_time), order, _towards(pitch))
         self._move(self._hand_position, _SEATING)
         self._end()
         return PlannedMotion(self._trajectory)

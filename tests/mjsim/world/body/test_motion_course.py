@@ -14,7 +14,9 @@ from small_worlds import do, scene_of, walk_to, world_of
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.values.actions import IDLE, EventKind, Pick, Place
 from mjsim.values.options import FIDELITIES, REST_STEPS
+from mjsim.world.body import hand_motions
 from mjsim.world.body.hand_motions import square_heading
+from mjsim.world.body.motion_profiles import ACROSS_FIRST, UP_FIRST
 from mjsim.world.body.rig import LOOK
 
 QUARTER = math.pi / 2
@@ -112,6 +114,28 @@ def test_a_load_goes_down_into_the_bin_by_a_person_who_stands_square_to_it_and_l
     for step in descent[:2]:
         assert abs(math.remainder(step.heading - QUARTER, math.tau)) < motion.receptacle_tolerance
         assert step.look == pytest.approx(towards(step, crate.center)[1], abs=0.05)
+
+
+@pytest.mark.parametrize(("height", "order"), [(0.1, UP_FIRST), (1.2, ACROSS_FIRST)])
+def test_an_object_is_lifted_off_the_floor_but_drawn_off_a_high_shelf(height, order):
+    orders = []
+    person = SimpleNamespace(
+        rig=SimpleNamespace(hand_targets=np.array([[0.6, 0.0, height]] * 2)),
+        motion=SimpleNamespace(align_time=0.1, lift_time=0.5),
+        steps=lambda _: 1,
+        swing=lambda _hand, _goal, _steps, order: orders.append(order) or iter(()),
+    )
+    assert len(list(hand_motions._lift(person, 0, np.array([0.5, 0.24, 1.1]), 0.0))) == 1
+    assert orders == [order]
+
+
+def test_a_hand_that_is_already_over_its_slot_takes_no_step(small_catalogue):
+    person = beside_the_crate(small_catalogue, "full")._tier.person
+    nearest = person.motion.least_travel
+    assert person.travel_steps(0.99 * nearest) == 0
+    assert person.travel_steps(1.01 * nearest) == person.steps(
+        person.motion.start_time + 1.01 * nearest / person.motion.travel_speed
+    )
 
 
 @tiers
