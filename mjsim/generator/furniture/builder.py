@@ -16,6 +16,7 @@ PANEL = 0.016  # thickness of cabinet doors and drawer fronts, in metres
 GAP = 0.008  # gap between cabinet doors or drawer fronts, in metres
 _LOW = ("books", "bowl", "box", "candles")
 _TALL = ("vase", "plant", "frame")
+LOW_LEGS = 0.25  # height of legs up to which objects cannot get between them, in metres
 SLOT = 0.36  # width of the surface that an object takes up, in metres
 DEEP_TOP, SHALLOW_TOP = 0.5, 0.3  # depths in metres; see `Builder.top`
 FACING = 'xyaxes="-1 0 0 0 0 1"'  # MJCF attribute that makes an image face +y
@@ -118,6 +119,9 @@ class Builder:
         inset: float = 0.05,
         radius: float = 0.022,
     ) -> None:
+        """Add four legs. Between low legs, an invisible box stops objects, which no hand could reach there."""
+        if height <= LOW_LEGS:
+            self.guard(w, y, (0, height))
         square = self.chance(0.5)
         for sx in (-1, 1):
             for v in (y[0] + inset, y[1] - inset):
