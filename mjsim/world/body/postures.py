@@ -20,8 +20,7 @@ Ints = NDArray[np.int32]
 # Horizontal part of a contact normal above which the object touches an obstacle and not a surface below it.
 UPRIGHT = 0.3
 
-# Distance between the target and the position of a hand that an obstacle stops, in metres. The servo then pushes with
-# 20 N.
+# Distance in metres by which the target is ahead of a hand that an obstacle stops. The servo then pushes with 20 N.
 _PRESS = 0.01
 _ARRIVED = 0.0005  # distance to the goal at which a hand stops, in metres
 
@@ -192,7 +191,7 @@ def _give_way(
 
 @kernel
 def _slacken(hand: int, away_f: float, away_l: float, pose: Floats, hands: Hands) -> None:
-    """Let a hand's target be at most `_PRESS` metres behind the obstacle that stops the hand.
+    """Keep a hand's target at most `_PRESS` metres ahead of the hand, in the direction of an obstacle.
 
     Otherwise, friction at the obstacle would hold the object, so that the hand could not slide past it.
     """
