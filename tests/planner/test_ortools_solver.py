@@ -70,6 +70,12 @@ def test_the_same_work_gives_the_same_plan():
     assert (first.visits, first.cost) == (second.visits, second.cost)
 
 
+def test_a_search_ends_after_the_given_number_of_solutions():
+    problem = random_problem(5, 12, 1, bins=6)
+    short, long = (solver("ortools").solve(problem, limit=SolveLimit(work=work)) for work in (1, 20))
+    assert short.cost > long.cost
+
+
 def test_a_search_asks_whether_to_stop_and_then_returns_a_plan():
     class StopsSoon(threading.Event):
         """An event that is set by another thread after it was asked for five times."""
