@@ -104,12 +104,13 @@ def test_alternatives_are_what_could_be_done_and_ties_are_of_one_bin(
     assert (found["alternatives"], found["tied_alternatives"], found["tied"]) == expected
 
 
-def test_the_bound_of_a_walk_saves_the_reach_on_both_ways_but_the_last():
-    """A bin of 0.4 m by 0.6 m, whose centre is 0.8 m from where one stands: its far corner is 1.14 m away."""
+@pytest.mark.parametrize(("x", "y"), [(0.1, 0.8), (0.1, -0.8), (-0.1, 0.8), (-0.1, -0.8)])
+def test_the_bound_of_a_walk_saves_the_reach_on_both_ways_but_the_last(x, y):
+    """A bin of 0.4 m by 0.6 m, seen from each of its corners: its far corner is 0.3 m to the side and 1.1 m away."""
     bin_ = SimpleNamespace(
         half_size=np.array([0.2, 0.3, 0.5]),
         rotation=np.eye(3),
-        center=np.array([0.0, 0.8, 0.5]),
+        center=np.array([x, y, 0.5]),
         approach=np.zeros(2),
     )
     house = SimpleNamespace(person=SimpleNamespace(reach=0.9), receptacles={"rack": bin_})
@@ -117,7 +118,7 @@ def test_the_bound_of_a_walk_saves_the_reach_on_both_ways_but_the_last():
         objects=[SimpleNamespace(name=name) for name in ("cup", "plate")],
         targets={"cup": "rack", "plate": "rack"},
     )
-    place = 0.9 + math.hypot(0.2, 1.1)
+    place = 0.9 + math.hypot(0.3, 1.1)
     saved = 2 * (2 * 0.9 + 2 * place) - place
     assert reach_bound(30.0, house, episode) == pytest.approx(30.0 - saved)
     assert reach_bound(1.0, house, episode) == 0.0
