@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,12 +12,22 @@ from sessions import prepared
 
 from experiments.errors import ConfigError
 from experiments.participants.distribution import Distributions, draw
+from experiments.participants.frontier import Frontier, SearchPlace
 from experiments.participants.guest import PARAMETERS, as_behaviour
-from experiments.participants.guest.decision import Task, Timing, choose, first_step_costs
+from experiments.participants.guest.decision import (
+    Chooser,
+    Decision,
+    Known,
+    Task,
+    Timing,
+    choose,
+    first_step_costs,
+)
 from experiments.participants.guest.deviations import Adherence, Compliance, Detours, Walking
 from experiments.participants.guest.perception import Memory, Noticing, Perception, Recollection
 from experiments.trials.setup import draw_behaviour
 from experiments.trials.trial_config import TrialConfig
+from planner.plan import Visit, VisitKind
 
 FULL_COMPLIANCE = {"compliance.follows": 1.0, "compliance.quits": 0.0}
 metres = st.floats(0.0, 30.0)
@@ -112,6 +123,43 @@ def test_looking_ahead_counts_the_visits_that_follow():
 def test_full_hands_can_only_place():
     task = Task(line([0, 2, 1]), picks=[1], bins=[2], carried=[2, 2], capacity=2)
     assert first_step_costs(task, 2) == [math.inf, 1.0, 1.0]
+
+
+ACCURATE = Decision(temperature=0.0, look_ahead=1.0, distance_error=0.0, room_cost=0.0, search_cost=0.0)
+
+
+def chosen_by(house, decision, position, objects, carried=(), pull=0.0):
+    """Return the choice of a guest that may also search. All objects belong in the same bin."""
+    rng, names = np.random.default_rng(0), [*objects, *carried]
+    percept = SimpleNamespace(
+        position=position,
+        hands_full=False,
+        carried=carried,
+        targets=dict.fromkeys(names, min(house.approaches)),
+    )
+    chooser = Chooser(decision, house, Frontier(house, rng), rng)
+    return chooser.choose(percept, Known(objects, pull, search=True))
+
+
+@pytest.mark.parametrize("pull", [0.0, 0.5, 1.0])
+def test_the_nearest_object_is_fetched_and_flagpoles_let_walls_be_forgotten(house, pull):
+    for seed in range(20):
+        points = house.navmesh.sample(np.random.default_rng(seed), 8)
+        walks, straight = house.geodesics.distances(points)[0], np.linalg.norm(points - points[0], axis=1)
+        nearest = 1 + np.argmin((1 - pull) * walks[1:] + pull * straight[1:])
+        objects = {f"object_{k}": point for k, point in enumerate(points) if k > 0}
+        made = chosen_by(house, ACCURATE, points[0], objects, pull=pull)
+        assert made == Visit(VisitKind.PICK, f"object_{nearest}")
+
+
+def test_a_costly_search_waits_until_the_hands_are_empty(house):
+    position = house.viewpoints["living_room"][0]
+    made = [
+        chosen_by(house, dataclasses.replace(ACCURATE, search_cost=cost), position, {}, carried=("cup",))
+        for cost in (0.0, 100.0)
+    ]
+    assert isinstance(made[0], SearchPlace)
+    assert made[1] == Visit(VisitKind.PLACE, "cup")
 
 
 # Compliance
