@@ -11,13 +11,13 @@ from experiments.web.server.guards import Guards, TimedConnection
 
 HEAD = b"POST / HTTP/1.1\r\nHost: localhost\r\nOrigin: http://localhost\r\n"
 WHOLE = HEAD + b"Content-Length: 0\r\n\r\n"
+PAGE = PlainTextResponse("a page")
 
 
 @asynccontextmanager
-async def serving():
-    app = Guards(PlainTextResponse("a page"), None)
+async def serving(page=PAGE):
     config = uvicorn.Config(
-        app,
+        Guards(page, None),
         port=0,
         http=TimedConnection,
         lifespan="off",
@@ -56,6 +56,21 @@ def test_a_request_that_does_not_end_is_closed(monkeypatch, request_):
                     pass
 
     asyncio.run(answer())
+
+
+def test_an_answer_may_take_longer_than_a_request(monkeypatch):
+    monkeypatch.setattr("experiments.web.server.guards.REQUEST_TIMEOUT", 0.2)
+
+    async def slow_page(scope, receive, send):
+        await asyncio.sleep(0.6)
+        await PAGE(scope, receive, send)
+
+    async def answer():
+        async with serving(slow_page) as port:
+            reader, _ = await ask(port, WHOLE)
+            return await asyncio.wait_for(reader.readline(), 5.0)
+
+    assert asyncio.run(answer()).startswith(b"HTTP/1.1 200")
 
 
 def test_who_opens_most_connections_makes_room(monkeypatch):
