@@ -335,6 +335,14 @@ def test_the_interval_of_the_share_of_houses_holds_the_true_one(share):
     assert 0.91 <= held / 200 <= (1.0 if share == 0 else 0.99)
 
 
+def test_a_house_that_explains_nearly_all_may_explain_all():
+    rng = np.random.default_rng(0)
+    houses, condition = np.repeat(np.arange(12), 6), np.tile([*"ab"], 36)
+    values = rng.normal(0, 1.0, 12)[houses] + rng.normal(0, 1e-4, 72)
+    house = mixed_model(values, condition, np.full(72, 6), {"house": houses}).random["house"]
+    assert house.interval == pytest.approx((1.0, 1.0), abs=1e-5)
+
+
 @pytest.mark.parametrize(
     ("people", "message"),
     [(8, "houses and cells are as many as people"), (80, "each cell has its own house")],
