@@ -151,6 +151,13 @@ def test_every_field_of_the_metrics_is_checked(copy, house):
         assert "metrics.json" in str(fault_of(copy, house))
 
 
+@pytest.mark.parametrize("other", [[], "forged", 1, None], ids=repr)
+def test_metrics_that_are_no_object_are_noticed(copy, other):
+    write_json(copy / records.METRICS, other)
+    write_checksums(copy, records.FILES)
+    assert derived_faults(copy) == "metrics.json is not an object"
+
+
 def test_every_field_of_the_plans_is_checked(copy, house):
     path = copy / records.PLAN
     plans = read_json(path)
