@@ -296,6 +296,12 @@ def test_who_gives_up_the_only_object_it_knows_looks_for_others(house, seed):
     assert events[-1]["reason"] == "all delivered"
 
 
+@pytest.mark.parametrize("seed", [1, 3])
+def test_whoever_gets_no_help_searches_place_after_place(house, seed):
+    config = trial(seed=seed, objects=3, assistance="none", time_limit=300.0)
+    assert played(house, config)[1][-1]["reason"] == "all delivered"
+
+
 def test_guidance_takes_its_time(house):
     quick, slow = (
         played(house, trial(FULL_COMPLIANCE | {"timing.pace": 1.0, "timing.guided_step": seconds}))
