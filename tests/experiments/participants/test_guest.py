@@ -302,6 +302,21 @@ def test_whoever_gets_no_help_searches_place_after_place(house, seed):
     assert played(house, config)[1][-1]["reason"] == "all delivered"
 
 
+def test_whoever_looks_around_turns_once_around_on_the_spot(house):
+    longest = []
+    for share in (0.0, 1.0):
+        config = trial({"perception.looks_around": share}, objects=3, assistance="none")
+        session, _, _ = prepared(house, config)
+        session.run()
+        trajectory = session.record.record().trajectory
+        stands = np.linalg.norm(np.diff(trajectory["position"], axis=0), axis=1) < 1e-4
+        turns, turned = np.diff(np.unwrap(trajectory["heading"])), [0.0]
+        for is_still, turn in zip(stands, turns, strict=True):
+            turned.append(turned[-1] + turn if is_still else 0.0)
+        longest.append(max(turned))
+    assert longest[0] < math.pi < math.tau <= longest[1] < math.tau + 1.0
+
+
 def test_guidance_takes_its_time(house):
     quick, slow = (
         played(house, trial(FULL_COMPLIANCE | {"timing.pace": 1.0, "timing.guided_step": seconds}))
