@@ -11,8 +11,9 @@ from experiments.session.first_person import FirstPersonRenderer
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.compose import Compositor
+from hud.state import FLOORPLAN
 from mjsim.house.scene.scene import compose
-from mjsim.render import Renderer
+from mjsim.render import Renderer, render_house_map
 
 DEMO = TrialConfig(objects=6, assistance="guided", seed=0, fidelity="event")
 FILM = FilmConfig.with_panels(640, 360, "draft")
@@ -69,3 +70,16 @@ def test_panels_cover_at_most_a_quarter_of_the_demos_frames_and_nothing_of_its_v
         assert over <= {"message"}
         if "message" in over:
             assert panels["message"].bottom < top + height // 8, "far above the hands"
+
+
+def test_a_minimap_shows_the_house_from_above_also_if_its_picture_is_drawn_late(house):
+    config = TrialConfig(objects=6, assistance="none-minimap", seed=0, fidelity="event", time_limit=1.0)
+    scene, recorder = compose(trial_episode(config, house), house.catalogue), Recorder()
+    session, world = prepare_session(config, house, scene, EventLog(), recorder)
+    session.run()
+    state, frames = recorder.shown[0][1], []
+    for pictures in ({}, {FLOORPLAN: render_house_map(house.catalogue, house.bounds)}):
+        with FirstPersonRenderer(scene, house, FILM, pictures) as drawn:
+            frames.append(drawn.frame(world.data, state))
+    assert state.minimap is not None
+    assert (frames[0] == frames[1]).all()
