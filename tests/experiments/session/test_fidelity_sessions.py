@@ -146,3 +146,15 @@ def test_the_tiers_deliver_the_same_in_about_the_same_time(house):
     assert event.delivered == full.delivered
     for name in ("completion_time_s", "task_distance_m"):
         assert event.metrics[name] == pytest.approx(full.metrics[name], rel=0.03)
+
+
+@pytest.mark.slow
+def test_objects_are_put_down_at_the_same_places_in_both_tiers(house):
+    """Objects of several sizes, each in its free place in the bin: at most 5 mm apart."""
+    places = []
+    for fidelity in ("event", "full"):
+        config = TrialConfig(objects=8, assistance="optimal", user="follower", seed=4, fidelity=fidelity)
+        session, world, _ = prepared(house, config)
+        assert session.run() == "all delivered"
+        places.append(world.observation().object_positions)
+    assert np.abs(places[0] - places[1]).max() < 0.005
