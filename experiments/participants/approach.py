@@ -34,15 +34,19 @@ class Approach:
             return
         is_pick = isinstance(answer.action, Pick)
         if is_pick and answer.object in self._latest:
-            visit, place = self._latest[answer.object]
-            self._failed.setdefault(visit, []).append(place)
+            self.fail(*self._latest[answer.object])
         made = Visit(VisitKind.PICK if is_pick else VisitKind.PLACE, answer.object)
         self._latest[answer.object] = made, percept.position.copy()
+
+    def fail(self, visit: Visit, place: Point) -> None:
+        """Record that a visit failed at a place."""
+        self._failed.setdefault(visit, []).append(place.copy())
 
     def elsewhere(self, percept: Percept, visit: Visit, goal: Goal) -> Point | None:
         """Return the nearest place away from all failed attempts.
 
-        Return None after fewer than `MAX_FAILURES` failures, or if there is no other place.
+        Return None after fewer than `MAX_FAILURES` failures. If there is no other place, return None and forget all
+        failures, so that the same places are tried again.
         """
         failed = self._failed.get(visit, [])
         if len(failed) < MAX_FAILURES:
@@ -52,6 +56,8 @@ class Approach:
             gaps = estimated_distances(self._house, percept.position, places) if places else []
             place = places[int(np.argmin(gaps))] if gaps else None
             self._place = visit, len(failed), place
+            if place is None:
+                del self._failed[visit]
         return self._place[2]
 
     def end(

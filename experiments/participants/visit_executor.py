@@ -23,8 +23,9 @@ class VisitExecutor:
     """An executor that carries out visits for a participant.
 
     The walk ends where the straight reach to the goal is free. After a refused pick or place, the participant
-    stops closer to the goal, and after two lost grips, elsewhere. A blocked participant takes another path. If
-    the participant has not seen the bin of a visit yet, the visit begins with a search for the bin.
+    stops closer to the goal. After two lost grips, or two refusals at the closest stop, the participant stands
+    elsewhere. A blocked participant takes another path. If the participant has not seen the bin of a visit yet,
+    the visit begins with a search for the bin.
     """
 
     def __init__(self, house: House) -> None:
@@ -112,6 +113,8 @@ class VisitExecutor:
             self._stop_distance = STOP_SHARE * percept.person.reach
             self._read_until = percept.time + percept.person.reading_time
         if percept.answer is not None and not percept.answer.applied:
+            if self._stop_distance == MIN_STOP_DISTANCE:
+                self._approach.fail(visit, percept.position)
             self._stop_distance = max(self._stop_distance - CLOSER, MIN_STOP_DISTANCE)
 
     def _is_reading(self, percept: Percept) -> bool:

@@ -16,7 +16,7 @@ PANEL = 0.016  # thickness of cabinet doors and drawer fronts, in metres
 GAP = 0.008  # gap between cabinet doors or drawer fronts, in metres
 _LOW = ("books", "bowl", "box", "candles")
 _TALL = ("vase", "plant", "frame")
-LOW_LEGS = 0.25  # height of legs up to which objects cannot get between them, in metres
+MAX_GAP = 0.25  # maximum height of a gap below furniture that is closed, in metres
 SLOT = 0.36  # width of the surface that an object takes up, in metres
 DEEP_TOP, SHALLOW_TOP = 0.5, 0.3  # depths in metres; see `Builder.top`
 FACING = 'xyaxes="-1 0 0 0 0 1"'  # MJCF attribute that makes an image face +y
@@ -75,13 +75,22 @@ class Builder:
 
     def box(self, material: str, w: float, y: Span, z: Span, x: float = 0.0, *, seen: bool = False) -> None:
         self.add("box", material, seen, _extent(w, y, z, x))
+        if not seen:
+            self._close_gap(w, y, z[0], x)
 
     def guard(self, w: float, y: Span, z: Span, x: float = 0.0) -> None:
         self.geoms.append(f'<geom class="guard" {_extent(w, y, z, x)}/>')
 
+    def _close_gap(self, w: float, y: Span, height: float, x: float) -> None:
+        """Close a low gap below a part with an invisible box, because no hand could reach an object in the gap."""
+        if 0 < height <= MAX_GAP:
+            self.guard(w, y, (0, height), x)
+
     def post(self, material: str, x: float, y: float, z: Span, radius: float, *, seen: bool = True) -> None:
         half = numbers(radius, (z[1] - z[0]) / 2)
         self.add("cylinder", material, seen, f'pos="{numbers(x, y, sum(z) / 2)}" size="{half}"')
+        if not seen:
+            self._close_gap(1.5 * radius, (y - 0.75 * radius, y + 0.75 * radius), z[0], x)
 
     def rod(self, material: str, start: Point, end: Point, radius: float, *, shape: str = "cylinder") -> None:
         self.add(shape, material, True, f'fromto="{numbers(*start, *end)}" size="{numbers(radius)}"')
@@ -119,9 +128,6 @@ class Builder:
         inset: float = 0.05,
         radius: float = 0.022,
     ) -> None:
-        """Add four legs. Between low legs, an invisible box stops objects, which no hand could reach there."""
-        if height <= LOW_LEGS:
-            self.guard(w, y, (0, height))
         square = self.chance(0.5)
         for sx in (-1, 1):
             for v in (y[0] + inset, y[1] - inset):

@@ -70,6 +70,11 @@ class Grips:
             self._held[hand] = None
             self._update()
 
+    def is_firm(self, hand: int) -> bool:
+        """Return True if a firm weld holds the object in a hand. Return False for a soft weld or an empty hand."""
+        held = self._held[hand]
+        return held is not None and bool(self._data.eq_active[self._welds[hand, held[0], held[1], 1]])
+
     def error(self, hand: int) -> float:
         """Return the distance in metres by which the weld of a hand is stretched, or 0 for an empty hand."""
         held = self._held[hand]

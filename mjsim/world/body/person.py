@@ -25,7 +25,9 @@ from mjsim.world.body.rig import Rig
 Motion = Generator[None, None, bool]
 Steps = Generator[None, None, None]
 
-FALL_DIVISION = 8  # number of parts into which each physics step is divided while an object falls
+DIVISION = 8  # number of parts into which each physics step is divided while an object is fast or strained
+MAX_LAG = 0.1  # distance of a loaded hand from its target above which its load is caught, in metres
+MAX_STRETCH = 0.005  # length of a firm grip above which the grip pulls its object in within a few steps, in metres
 
 
 @dataclass(eq=False)
@@ -75,8 +77,20 @@ class Person:
         return tuple(hand for hand in usable if self.held[hand] is None)
 
     def advance(self) -> None:
-        """Simulate one control step, with shorter physics steps while an object falls."""
-        self.rig.advance(FALL_DIVISION if self.fall_detector.detects(self.grips.gripped) else 1)
+        """Simulate one control step, with shorter physics steps while an object is fast or strained."""
+        is_fast = self.fall_detector.detects(self.grips.gripped)
+        self.rig.advance(DIVISION if is_fast or any(map(self.is_strained, (avatar.LEFT, avatar.RIGHT))) else 1)
+
+    def is_strained(self, hand: int) -> bool:
+        """Return True if the load of a hand is about to become fast.
+
+        A load that is caught at furniture is thrown as soon as it comes free. A grip that has just become firm pulls
+        its object away from whatever the object touches.
+        """
+        if not self.grips.is_firm(hand):
+            return False
+        lag = math.dist(self.rig.hands[hand], self.rig.hand_targets[hand])
+        return lag > MAX_LAG or self.grips.error(hand) > MAX_STRETCH
 
     def steps(self, seconds: float) -> int:
         """Convert a duration in seconds to a number of control steps, at least 1."""
