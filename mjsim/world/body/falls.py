@@ -16,6 +16,7 @@ from mjsim.support.kernels import kernel
 
 MAX_SPEED = 1.0  # downward speed of a part of an object above which the object is falling, in m/s
 MAX_SWING = 2.0  # speed of a carried object above which it swings around the hand, in m/s
+MAX_MEETING = 1.4  # relative speed above which two carried objects may meet hard, in m/s
 Floats = NDArray[np.float64]
 
 
@@ -30,7 +31,7 @@ class FallDetector:
         self._arrays = (data.qvel, data.xmat, index.dofs, index.bodies, radii)
 
     def detects(self, gripped: tuple[int, ...]) -> bool:
-        """Return True if a `gripped` object swings, or another object falls or tumbles fast."""
+        """Return True if a `gripped` object swings or meets another, or a loose object falls or tumbles fast."""
         first, second = (*gripped, -1, -1)[:2]
         return bool(_falls(self._arrays, first, second))
 
@@ -38,6 +39,12 @@ class FallDetector:
 @kernel
 def _falls(arrays: Any, first: int, second: int) -> bool:
     qvel, xmat, dofs, bodies, radii = arrays
+    if first >= 0 and second >= 0:
+        meeting = 0.0
+        for axis in range(3):
+            meeting += (qvel[dofs[first] + axis] - qvel[dofs[second] + axis]) ** 2
+        if meeting > MAX_MEETING**2:
+            return True
     for item in range(len(dofs)):
         dof = dofs[item]
         if item in (first, second):

@@ -26,6 +26,8 @@ _TOUCH = 0.0005  # overlap with other geoms at which an object is no longer lowe
 _OVERLAP = 0.001  # overlap with other geoms below which the hand opens, in metres
 _RAISE = 0.003  # distance by which an overlapping object is raised per control step, in metres
 _RAISE_TIMEOUT = 0.6  # time limit for raising an overlapping object, in seconds
+# Maximum angle to a receptacle on the side of the other hand if that hand holds a load, in radians
+_MAX_ACROSS = math.pi / 6
 
 
 def pick(
@@ -88,7 +90,7 @@ def _draw_in(person: Person, hand: int) -> Steps:
 
 def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
     """Put an object into its receptacle, then turn the head to `pitch` radians. Return True on success."""
-    heading = square_heading(person, receptacle)
+    heading = square_heading(person, hand, receptacle)
     yield from person.face(receptacle.center, person.motion.receptacle_tolerance, heading)
     person.moving_hand = hand
     corners = object_corners(person.scene.model, person.scene.index.geoms(person.scene.index.names[item]))
@@ -103,13 +105,22 @@ def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, 
     return success
 
 
-def square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
-    """Return the heading parallel to a side of the receptacle at which the person faces it most directly."""
+def square_heading(person: Person, hand: int, receptacle: ReceptacleGeometry) -> float:
+    """Return a heading parallel to a side of the receptacle.
+
+    The person faces the receptacle as directly as possible, or stands with the placing hand next to it if the hand
+    would otherwise have to reach across a load in the other hand.
+    """
     rig = person.rig
     towards = rig.heading + rig.bearing(receptacle.center)
     side = math.atan2(receptacle.rotation[1, 0], receptacle.rotation[0, 0])
     quarter = math.pi / 2
-    return rig.heading + wrap(side + quarter * round(wrap(towards - side) / quarter) - rig.heading)
+    quarters = round(wrap(towards - side) / quarter)
+    sign = 1.0 - 2.0 * hand
+    across = -sign * wrap(towards - side - quarter * quarters)  # angle by which the hand reaches to the other side
+    if across > _MAX_ACROSS and person.held[1 - hand] is not None:
+        quarters -= round(sign)
+    return rig.heading + wrap(side + quarter * quarters - rig.heading)
 
 
 def hover_height(person: Person, receptacle: ReceptacleGeometry, slot: Slot) -> float:

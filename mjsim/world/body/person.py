@@ -27,7 +27,9 @@ Steps = Generator[None, None, None]
 
 DIVISION = 8  # number of parts into which each physics step is divided while an object is fast or strained
 MAX_LAG = 0.1  # distance of a loaded hand from its target above which its load is caught, in metres
-MAX_STRETCH = 0.005  # length of a firm grip above which the grip pulls its object in within a few steps, in metres
+MAX_STRETCH = (
+    0.005  # length of a firm grip above which the grip pulls its object in within a few steps, in metres
+)
 
 
 @dataclass(eq=False)
@@ -79,7 +81,9 @@ class Person:
     def advance(self) -> None:
         """Simulate one control step, with shorter physics steps while an object is fast or strained."""
         is_fast = self.fall_detector.detects(self.grips.gripped)
-        self.rig.advance(DIVISION if is_fast or any(map(self.is_strained, (avatar.LEFT, avatar.RIGHT))) else 1)
+        self.rig.advance(
+            DIVISION if is_fast or any(map(self.is_strained, (avatar.LEFT, avatar.RIGHT))) else 1
+        )
 
     def is_strained(self, hand: int) -> bool:
         """Return True if the load of a hand is about to become fast.

@@ -104,7 +104,7 @@ class MotionPlanner:
         return grip
 
     def _bring_over(self, item: int, receptacle: ReceptacleGeometry) -> tuple[Slot, float]:
-        heading = square_heading(self._person, receptacle)
+        heading = square_heading(self._person, self._hand, receptacle)
         self._face(receptacle.center, heading, self._times.receptacle_tolerance)
         extent = self._load_extent(receptacle)
         low = float(extent.low[2])

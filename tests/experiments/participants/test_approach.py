@@ -1,4 +1,4 @@
-"""Where participants stop: the reach is free there, and after two lost grips they stand elsewhere."""
+"""Where participants stop: the reach is free there, and after two lost grips or refusals they stand elsewhere."""
 
 import math
 from collections import Counter
@@ -10,10 +10,11 @@ from sessions import prepared
 from small_worlds import edited, episode_of
 
 from experiments.house import House
-from experiments.participants.approach import Approach
+from experiments.participants.approach import MIN_STOP_DISTANCE, Approach
 from experiments.participants.base import Percept
+from experiments.participants.visit_executor import VisitExecutor
 from experiments.trials.trial_config import TrialConfig
-from mjsim.values.actions import ActionResult, Pick, Place
+from mjsim.values.actions import ActionResult, Pick, Place, Refusal
 from mjsim.values.observation import Observation
 from mjsim.world.body.carrying import Carrying
 from planner.plan import Visit, VisitKind
@@ -106,14 +107,14 @@ def test_other_walks_do_not_change(by_the_door):
     assert end is path and stop_distance == 0.72
 
 
-def attempt(action, position):
-    """A percept just after an attempt has begun."""
+def attempt(action, position, refusal=None):
+    """A percept just after an attempt has begun or was refused."""
     nothing = np.zeros((0, 3))
     seen = Observation(
         *(0.0, np.array(position), 0.0, 0.0, np.zeros(3), np.zeros(2)),
-        *((), nothing, np.zeros((0, 4)), (), (None, None), True),
+        *((), nothing, np.zeros((0, 4)), (), (None, None), refusal is None),
     )
-    return Percept(seen, {"board": "tray"}, ActionResult(action, None, action.object, "tray"))
+    return Percept(seen, {"board": "tray"}, ActionResult(action, refusal, action.object, "tray"))
 
 
 @pytest.mark.parametrize(("lost_at", "moves"), [((), False), ((0.0,), False), ((0.0, 0.05), True)])
@@ -130,6 +131,22 @@ def test_the_second_lost_grip_changes_the_place(by_the_door, lost_at, moves):
     assert approach.elsewhere(percept, Visit(VisitKind.PICK, "board"), usual) is None
     if other is not None:
         assert math.dist(other, usual) >= 0.4 and by_the_door.standing.suits(other, tray)
+
+
+def test_a_pick_that_is_refused_close_to_the_object_is_tried_from_all_sides(by_the_door):
+    """If it is refused at all places, the participant returns to the first one."""
+    executor, at, visit = VisitExecutor(by_the_door), np.array([1.5, 2.0]), Visit(VisitKind.PICK, "board")
+    position, ends = np.array([1.5, 1.7]), []
+    for _ in range(40):
+        action = executor.act(attempt(Pick("board"), position, Refusal.OUT_OF_REACH), visit, {"board": at})
+        ends.append((*action.points[-1].tolist(), action.stop_distance))
+        if action.stop_distance == 0.0:
+            position = action.points[-1]
+    firsts = ends.index(next(end for end in ends if end[2] == 0.0))
+    assert 3 < firsts < 12  # it is tried closer and closer before
+    sides = {round(math.atan2(y - at[1], x - at[0])) for x, y, stop in ends if stop == 0.0}
+    assert len(sides) >= 3
+    assert 0.0 < max(stop for *_, stop in ends[firsts:]) <= MIN_STOP_DISTANCE
 
 
 def test_an_object_is_not_fetched_through_a_wall(tmp_path):

@@ -25,6 +25,38 @@ def test_the_right_load_rises_while_the_hands_pass_each_other(small_catalogue, a
     assert abs(person.hand_velocities[0, 2]) < 0.01
 
 
+def divisions(person, monkeypatch):
+    """Division of the physics steps in each control step, and whether the right hand's grip is firm."""
+    found, advance = [], person.rig.advance
+
+    def recorded(division):
+        found.append((division, person.grips.is_firm(avatar.RIGHT)))
+        advance(division)
+
+    monkeypatch.setattr(person.rig, "advance", recorded)
+    return found
+
+
+def test_steps_are_short_while_a_grip_that_became_firm_pulls_its_object_in(small_catalogue, monkeypatch):
+    """Otherwise, an object that touches its shelf is thrown away from the shelf at 10 m/s."""
+    world = world_of(scene_of(small_catalogue, (1.5, 2.0, 0.0), ("cube", 2.0, 1.8), height=0.001))
+    found = divisions(world._tier.person, monkeypatch)
+    do(world, Pick("o0"))
+    firm = [division for division, is_firm in found if is_firm]
+    assert firm[0] > 1 and firm[-1] == 1
+
+
+@pytest.mark.parametrize(("distance", "is_caught"), [(0.05, False), (0.2, True)])
+def test_steps_are_short_while_furniture_holds_a_load_back(small_catalogue, monkeypatch, distance, is_caught):
+    world = world_of(scene_of(small_catalogue, (1.5, 2.0, 0.0), ("cube", 2.0, 1.8), height=0.001))
+    do(world, Pick("o0"))
+    person = world._tier.person
+    found = divisions(person, monkeypatch)
+    person.rig.hand_targets[avatar.RIGHT, 1] -= distance
+    person.advance()
+    assert (found[0][0] > 1) == is_caught
+
+
 @pytest.mark.parametrize("blocked", [True, False])
 def test_a_hand_whose_load_an_obstacle_stops_hardly_presses_on_it_so_that_it_can_slide_past(
     small_catalogue, monkeypatch, blocked
