@@ -27,9 +27,8 @@ Steps = Generator[None, None, None]
 
 DIVISION = 8  # number of parts into which each physics step is divided while an object is fast or strained
 MAX_LAG = 0.1  # distance of a loaded hand from its target above which its load is caught, in metres
-MAX_STRETCH = (
-    0.005  # length of a firm grip above which the grip pulls its object in within a few steps, in metres
-)
+# Length of a firm grip above which the grip pulls its object in within a few physics steps, in metres
+MAX_STRETCH = 0.005
 
 
 @dataclass(eq=False)

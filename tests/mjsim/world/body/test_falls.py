@@ -72,7 +72,22 @@ def test_loads_may_be_faster_than_loose_objects(catalogue, navmesh, velocity, lo
     detector = FallDetector(world.model, world.data, world.scene.index)
     world.data.qvel[:] = 0.0
     assert not detector.detects(()) and not detector.detects((0, 1))
-    dof = world.scene.index.dofs[1]
-    world.data.qvel[dof : dof + 3] = velocity
-    assert (detector.detects(()), detector.detects((0,))) == (loose, loose)
-    assert (detector.detects((1,)), detector.detects((0, 1))) == (carried, carried)
+    first, second = world.scene.index.dofs
+    world.data.qvel[second : second + 3] = velocity
+    assert (detector.detects(()), detector.detects((0,)), detector.detects((1,))) == (loose, loose, carried)
+    world.data.qvel[first : first + 3] = velocity
+    assert detector.detects((0, 1)) == carried
+
+
+@pytest.mark.parametrize(
+    ("velocities", "found"), [((1.5, 1.5), False), ((1.2, -0.1), False), ((1.2, -0.4), True)]
+)
+def test_loads_that_meet_fast_are_detected(catalogue, navmesh, velocities, found):
+    rng = np.random.default_rng(8)
+    places = [(model, *navmesh.sample(rng)) for model in MODELS[:2]]
+    world = world_of(scene_of(catalogue, (*navmesh.sample(rng), 0.0), *places, height=0.01))
+    detector = FallDetector(world.model, world.data, world.scene.index)
+    world.data.qvel[:] = 0.0
+    world.data.qvel[world.scene.index.dofs] = velocities
+    assert detector.detects((0, 1)) == found
+    assert not detector.detects((0,))

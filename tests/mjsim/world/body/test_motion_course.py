@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from small_worlds import do, scene_of, walk_to, world_of
 
 from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.scene.avatar import LEFT, RIGHT
 from mjsim.values.actions import IDLE, EventKind, Pick, Place
 from mjsim.values.options import FIDELITIES, REST_STEPS
 from mjsim.world.body import hand_motions
@@ -85,19 +86,28 @@ def placed(world):
 
 
 @given(
-    x=st.floats(-3.0, 3.0), y=st.floats(-3.0, 3.0), heading=st.floats(-20.0, 20.0), side=st.floats(-math.pi, math.pi)
+    x=st.floats(-3.0, 3.0), y=st.floats(-3.0, 3.0), heading=st.floats(-20.0, 20.0), side=st.floats(-math.pi, math.pi),
+    hand=st.sampled_from([LEFT, RIGHT]), loaded=st.booleans(),
 )  # fmt: skip
-def test_the_heading_for_a_place_is_square_to_the_bin_faces_it_and_is_the_shortest_turn(x, y, heading, side):
+def test_the_heading_for_a_place_is_square_to_the_bin_and_does_not_make_loaded_hands_cross(
+    x, y, heading, side, hand, loaded
+):
+    """It faces the bin as directly as possible. With two loads, a bin is at most 30 degrees to the wrong side."""
     c, s = math.cos(side), math.sin(side)
     bin_ = SimpleNamespace(
         center=np.array([x, y, 0.2]), rotation=np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     )
     direction = math.atan2(y, x)
     rig = SimpleNamespace(heading=heading, bearing=lambda _: math.remainder(direction - heading, math.tau))
-    found = square_heading(SimpleNamespace(rig=rig), bin_)
+    held = [0, 0] if loaded else [0 if hand == LEFT else None, 0 if hand == RIGHT else None]
+    found = square_heading(SimpleNamespace(rig=rig, held=held), hand, bin_)
     assert math.remainder(found - side, QUARTER) == pytest.approx(0.0, abs=1e-9)
-    assert abs(math.remainder(found - direction, math.tau)) <= QUARTER / 2 + 1e-9
     assert abs(found - heading) <= math.pi + 1e-9
+    across = math.remainder(direction - found, math.tau) * (-1 if hand == LEFT else 1)
+    if loaded:
+        assert -math.pi / 3 - 1e-9 <= across <= math.pi / 6 + 1e-9
+    else:
+        assert abs(across) <= QUARTER / 2 + 1e-9
 
 
 @tiers
