@@ -117,8 +117,8 @@ def square_heading(person: Person, hand: int, receptacle: ReceptacleGeometry) ->
     quarter = math.pi / 2
     quarters = round(wrap(towards - side) / quarter)
     sign = 1.0 - 2.0 * hand
-    across = -sign * wrap(towards - side - quarter * quarters)  # angle by which the hand reaches to the other side
-    if across > _MAX_ACROSS and person.held[1 - hand] is not None:
+    left = wrap(towards - side - quarter * quarters)  # angle from the heading to the receptacle
+    if -sign * left > _MAX_ACROSS and person.held[1 - hand] is not None:
         quarters -= round(sign)
     return rig.heading + wrap(side + quarter * quarters - rig.heading)
 
