@@ -55,18 +55,18 @@ class SceneIndex:
         )
 
     def position_of(self, name: str) -> int:
-        """Return the index of the object with this name. Raise an EpisodeError if there is none."""
+        """Return the index of the object with this name. Raise an EpisodeError if the name is unknown."""
         try:
             return self.names.index(name)
         except ValueError:
             raise EpisodeError(f"no object {name!r} in the scene; it has {list(self.names)}") from None
 
     def body(self, name: str) -> int:
-        """Return the body id of the object with this name. Raise an EpisodeError if there is none."""
+        """Return the body id of the object with this name. Raise an EpisodeError if the name is unknown."""
         return int(self.bodies[self.position_of(name)])
 
     def geoms(self, name: str) -> NDArray[np.intp]:
-        """Return the geom ids of the object with this name. Raise an EpisodeError if there is none."""
+        """Return the geom ids of the object with this name. Raise an EpisodeError if the name is unknown."""
         return np.flatnonzero(self.geom_owner == self.position_of(name))
 
     def poses(self, qpos: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -98,7 +98,7 @@ class Scene:
     _derived: dict[str, object] = field(init=False, repr=False, default_factory=dict)
 
     def cached(self, key: str, make: Callable[[], T]) -> T:
-        """Return the value cached under `key`. If there is none, compute it with `make`."""
+        """Return the value cached under `key`. Compute it with `make` on the first call."""
         if key not in self._derived:
             self._derived[key] = make()
         return cast(T, self._derived[key])
