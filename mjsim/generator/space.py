@@ -165,8 +165,9 @@ class Space:
 
     def reachable(self, places: Sequence[Point]) -> list[Point]:
         """Return the places on furniture from which a person can take an object without bending around things."""
-        floor, free = self.room.floor, self._distance(self.hit, _FINE) > STANDING
-        cells = (np.argwhere(free) - 0.5) * _FINE + (floor.x0, floor.y0)
+        floor, (_, islands) = self.room.floor, _islands(self._distance(self.hit, _FINE), STANDING)
+        largest = np.bincount(islands.ravel(), minlength=2)[1:].argmax() + 1  # others are tolerated pockets
+        cells = (np.argwhere(islands == largest) - 0.5) * _FINE + (floor.x0, floor.y0)
         steps, found = np.linspace(0.0, 1.0, 9)[:, None], []
         for place in places:
             away = np.hypot(*(cells - place[:2]).T)

@@ -106,6 +106,17 @@ def test_a_place_behind_something_is_no_place() -> None:
     assert not space.reachable([(x, y - 0.15, 0.7)])
 
 
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_place_beside_a_pocket_of_the_floor_is_no_place(closed: bool) -> None:
+    """A pocket on which a person fits counts only if there is a way to it."""
+    space = Space.of(studio(), studio().rooms[1], np.random.default_rng(0))
+    floor, x, y = space.room.floor, *space.room.floor.center
+    space.hit += [(floor.x0, y - 0.3, x, y + 0.3), (floor.x0 + 0.6, y + 0.3, floor.x0 + 0.9, floor.y1)]
+    if not closed:
+        space.hit[-1] = (floor.x0 + 0.6, y + 0.3, floor.x0 + 0.9, floor.y1 - 0.7)
+    assert bool(space.reachable([(floor.x0 + 0.3, y + 0.1, 0.7)])) != closed
+
+
 def test_all_places_of_use_can_be_reached(home: FurnishedHome) -> None:
     for space in home.spaces:
         assert space.connected(())
