@@ -1,7 +1,7 @@
 """A controller for hands that carry objects, which keeps the objects away from walls and furniture.
 
-An object that gets stuck slips out of the hand. It counts as stuck if its weld is stretched, or if the hand
-lags far behind its target position.
+An object that gets stuck slips out of the hand. It counts as stuck if its weld is stretched, if the hand lags far
+behind its target position, or if the hand yields to furniture as far as it can for several seconds.
 """
 
 import math
@@ -28,6 +28,8 @@ Floats = NDArray[np.float64]
 
 # Lag of a hand at which it counts as stuck, in metres. The servo reaches its force limit at 0.04 m.
 MAX_SERVO_LAG = 0.25
+# Strain of a hand in a control step in which it yields as far as it can, relative to that of a stretched weld
+YIELDING = 0.04
 LOW, HIGH = 0.93, 1.60  # range of heights of carried objects, in metres
 _NO_GEOMS, _NO_FRAMES = np.zeros((0, 2), np.int32), np.zeros((0, 9))
 _HOUSE, _PERSON = -1, -2  # owner numbers of geoms that do not belong to an object
@@ -40,19 +42,21 @@ def count_strain(
     site_xpos: Floats,
     sites: NDArray[np.intp],
     held: tuple[bool, bool],
+    yields: tuple[bool, bool],
     max_error: float,
     patience: float,
-    strained: NDArray[np.int64],
+    strained: Floats,
 ) -> int:
     """Update `strained` (2,), the number of consecutive control steps in which each hand was strained.
 
-    A hand is strained if its weld is stretched by more than `max_error` metres or it lags far behind its
-    target. Returns a bit mask of the hands whose number exceeds `patience`: 1 for the left, 2 for the right.
+    A hand is strained if its weld is stretched by more than `max_error` metres or it lags far behind its target. A
+    step in which the hand only `yields` as far as it can counts as `YIELDING`. Returns a bit mask of the hands whose
+    number exceeds `patience`: 1 for the left, 2 for the right.
     """
     slipping = 0
     for hand in range(2):
         if not held[hand]:
-            strained[hand] = 0
+            strained[hand] = 0.0
             continue
         lag = 0.0
         for axis in range(3):
@@ -60,7 +64,8 @@ def count_strain(
         first, second = sites[hand, 0], sites[hand, 1]
         error = site_gap(site_xpos, first, second) if first >= 0 else 0.0
         tense = error > max_error or math.sqrt(lag) > MAX_SERVO_LAG
-        strained[hand] = strained[hand] + 1 if tense else 0
+        strain = 1.0 if tense else YIELDING if yields[hand] else 0.0
+        strained[hand] = strained[hand] + strain if strain > 0.0 else 0.0
         if strained[hand] > patience:
             slipping += 1 << hand
     return slipping
@@ -72,8 +77,7 @@ class CarryingState:
 
     # Horizontal offset by which contacts have pushed each hand from its posture, in metres, shape (2, 2).
     compliance: NDArray[np.float64]
-    # Number of consecutive control steps in which each hand was strained, shape (2,).
-    strained: NDArray[np.int64]
+    strained: Floats  # number of consecutive control steps in which each hand was strained, shape (2,)
 
 
 class Carrying:
@@ -100,7 +104,7 @@ class Carrying:
             person.posture_pace,
         )  # fmt: skip
         self._parameters = tuple(person.parameters.carrying)
-        self._strained = np.zeros(2, np.int64)
+        self._strained = np.zeros(2)
 
     def reset(self) -> None:
         self._compliance[:] = 0.0
@@ -147,12 +151,15 @@ class Carrying:
         if left is None and right is None:
             self._strained[:] = 0
             return ()
+        most = 0.99 * person.parameters.carrying.most_compliance
+        left_yields, right_yields = (np.hypot(*self._compliance.T) > most).tolist()
         found = count_strain(
             person.rig.pose,
             person.rig.hand_targets,
             person.data.site_xpos,
             person.grips.sites,
             (left is not None, right is not None),
+            (left_yields, right_yields),
             options.grip_error,
             options.grip_patience / person.dt,
             self._strained,

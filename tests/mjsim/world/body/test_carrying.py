@@ -75,3 +75,17 @@ def test_a_hand_whose_load_an_obstacle_stops_hardly_presses_on_it_so_that_it_can
     ahead, aside = (person.rig.hand_targets - person.rig.hands)[hand, :2]
     assert (ahead < 0.02) == blocked
     assert aside > 0.08
+
+
+@pytest.mark.parametrize(("yields", "seconds"), [(0.5, None), (1.0, 2.5)])
+def test_a_load_that_furniture_holds_for_seconds_slips_out_of_the_hand(small_catalogue, yields, seconds):
+    """Otherwise, a person whose load is caught between furniture could neither walk nor turn any more."""
+    world = world_of(scene_of(small_catalogue, (1.5, 2.0, 0.0), ("cube", 2.0, 1.8), height=0.001))
+    do(world, Pick("o0"))
+    person, carrying = world._tier.person, world._tier.carrying
+    carrying._compliance[avatar.RIGHT] = yields * person.parameters.carrying.most_compliance, 0.0
+    steps = next((k for k in range(200) if carrying.slipped() == (avatar.RIGHT,)), None)
+    if seconds is None:
+        assert steps is None
+    else:
+        assert steps * person.dt == pytest.approx(seconds, rel=0.1)
