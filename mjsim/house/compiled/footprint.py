@@ -86,7 +86,7 @@ def outline_points(
         rim = _CIRCLE @ (rotation[:, :2] * size[0]).T
         return np.vstack([centre - axis + rim, centre + axis + rim])
     raise AssetError(
-        f"geom {_name(model, geom)} is of type {_GEOM(kind).name}, whose outline is not known; "
+        f"geom {geom_name(model, geom)} is of type {_GEOM(kind).name}, whose outline is not known; "
         "build it from primitives or meshes"
     )
 
@@ -115,11 +115,12 @@ def _hull(model: mujoco.MjModel, geom: int, points: NDArray[np.float64]) -> NDAr
         return np.ascontiguousarray(points[ConvexHull(points).vertices])
     except QhullError as error:
         raise AssetError(
-            f"static geom {_name(model, geom)} has no area seen from above; give it a thickness"
+            f"static geom {geom_name(model, geom)} has no area seen from above; give it a thickness"
         ) from error
 
 
-def _name(model: mujoco.MjModel, geom: int) -> str:
+def geom_name(model: mujoco.MjModel, geom: int) -> str:
+    """Return the quoted name of a geom, or its number and body if it has no name."""
     body = model.body(model.geom_bodyid[geom]).name
     return repr(model.geom(geom).name or f"#{geom} of body {body}")
 

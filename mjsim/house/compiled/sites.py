@@ -45,7 +45,11 @@ class RoomMap:
         for site, key in zip(sites, keys, strict=True):
             if key not in labels:
                 raise AssetError(f"site {names[site]!r} names a room that is not in {sorted(labels)}")
-            _check_box(model, data, site, names[site])
+            upright = abs(data.site_xmat[site, 8]) > 1 - 1e-6
+            if model.site_type[site] != mujoco.mjtGeom.mjGEOM_BOX or not upright:
+                raise AssetError(
+                    f"site {names[site]!r} must be of type box and turned about the vertical only"
+                )
         missing = sorted(set(labels) - set(keys))
         if missing:
             raise AssetError(f"rooms {missing} of the catalogue have no site '{PREFIX}<key>' in the house")
@@ -120,12 +124,6 @@ def nearest_rectangle(
         v = max(abs(axes[k, 0, 1] * dx + axes[k, 1, 1] * dy) - half_sizes[k, 1], 0.0)
         nearest = min(nearest, math.hypot(u, v))
     return nearest
-
-
-def _check_box(model: mujoco.MjModel, data: mujoco.MjData, site: int, name: str) -> None:
-    upright = abs(data.site_xmat[site, 8]) > 1 - 1e-6
-    if model.site_type[site] != mujoco.mjtGeom.mjGEOM_BOX or not upright:
-        raise AssetError(f"site {name!r} must be of type box and turned about the vertical only")
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,12 +26,13 @@ _DOWN = np.array([0.0, 0.0, -1.0])
 
 def check_bins(floor: WalkableFloor) -> Iterator[Finding]:
     for receptacle in floor.receptacles.values():
-        for rule in (_bin_height, _bin_surroundings, _bin_use):
-            yield from rule(floor, receptacle)
+        subject = replace(floor.compiled, subject=f"receptacle {receptacle.key}")
+        yield from _bin_height(floor, receptacle, subject)
+        yield from _bin_surroundings(receptacle, subject)
+        yield from _bin_use(floor, receptacle, subject)
 
 
-def _bin_height(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
-    subject = _for_receptacle(floor, receptacle)
+def _bin_height(floor: WalkableFloor, receptacle: ReceptacleGeometry, subject: Compiled) -> Iterator[Finding]:
     bottom, top = receptacle.center[2] + receptacle.half_size[2] * np.array([-1.0, 1.0])
     if top > MAX_TOP:
         yield subject.error(
@@ -62,25 +63,24 @@ def _bin_height(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterato
         )
 
 
-def _bin_surroundings(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
-    compiled, subject = floor.compiled, _for_receptacle(floor, receptacle)
-    model = compiled.model
+def _bin_surroundings(receptacle: ReceptacleGeometry, subject: Compiled) -> Iterator[Finding]:
+    model, data = subject.model, subject.data
     own = model.body(f"{receptacle.key}/receptacle").id
     half = receptacle.half_size
     for x, y in _WITHIN:
         start = receptacle.center + receptacle.rotation @ (half * [x, y, 1.0]) + [0.0, 0.0, ABOVE]
-        distance, geom = first_hit(model, compiled.data, start, _DOWN, without=own)
+        distance, geom = first_hit(model, data, start, _DOWN, without=own)
         height = start[2] - distance
         if height > receptacle.center[2] - half[2] + INSIDE_GAP:
             yield subject.error(
                 "reach",
-                f"geom {compiled.geom_name(geom)} of the house is over it or in it, at z = {height:.2f} m",
+                f"geom {subject.geom_name(geom)} of the house is over it or in it, at z = {height:.2f} m",
                 f"leave {ABOVE} m free above it, so that a hand can lower an object",
                 (*start[:2], height),
             )
             return
-    mount = compiled.data.site_xpos[compiled.site(f"mount:{receptacle.key}")]
-    gap, _ = first_hit(model, compiled.data, mount + _LIFT, _DOWN, without=own)
+    mount = data.site_xpos[subject.site(f"mount:{receptacle.key}")]
+    gap, _ = first_hit(model, data, mount + _LIFT, _DOWN, without=own)
     if gap > SUPPORT_GAP:
         yield subject.warning(
             "reach",
@@ -90,9 +90,7 @@ def _bin_surroundings(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> I
         )
 
 
-def _bin_use(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
-    compiled = floor.compiled
-    subject = _for_receptacle(floor, receptacle)
+def _bin_use(floor: WalkableFloor, receptacle: ReceptacleGeometry, subject: Compiled) -> Iterator[Finding]:
     stand = floor.navigable.snap(receptacle.approach, math.inf)
     away, gap = float(np.hypot(*(stand - receptacle.approach))), receptacle.distance(stand)
     if away > SNAP or gap > DEFAULT.reach:
@@ -104,7 +102,7 @@ def _bin_use(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[F
             (*receptacle.approach, 0.0),
         )
     elif not receptacle_in_sight(
-        compiled.model, compiled.data, np.array([*stand, DEFAULT.eye_height]), receptacle
+        subject.model, subject.data, np.array([*stand, DEFAULT.eye_height]), receptacle
     ):
         yield subject.error(
             "reach",
@@ -119,7 +117,3 @@ def _bin_use(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[F
             "leave free floor next to it, away from doorways",
             receptacle.center,
         )
-
-
-def _for_receptacle(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Compiled:
-    return replace(floor.compiled, subject=f"receptacle {receptacle.key}")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.catalogue.model_files import ModelFile
-from mjsim.house.compiled.footprint import outline_points
+from mjsim.house.compiled.footprint import geom_name, outline_points
 from mjsim.house.validation.findings import Finding
 from mjsim.values.errors import AssetError
 
@@ -70,8 +70,7 @@ class Compiled:
         return np.array([points.min(axis=0), points.max(axis=0)])
 
     def geom_name(self, geom: int) -> str:
-        body = self.model.body(int(self.model.geom_bodyid[geom])).name
-        return repr(self.model.geom(geom).name or f"#{geom} of body {body}")
+        return geom_name(self.model, geom)
 
     def site(self, name: str) -> int | None:
         found = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, name)
@@ -146,21 +145,16 @@ def check_groups(compiled: Compiled) -> Iterator[Finding]:
     """Check that geoms in groups 0 and 3 collide, and that geoms in groups 1 and 2 do not collide."""
     model = compiled.model
     collides = (model.geom_contype | model.geom_conaffinity) != 0
-    solid = np.isin(model.geom_group, SOLID_GROUPS)
-    for geom in np.flatnonzero(collides & ~solid):
-        yield compiled.error(
-            "groups",
-            f"geom {compiled.geom_name(int(geom))} collides but is in group {model.geom_group[geom]}",
-            'use group 0 (seen) or 3 (not seen), or make it visual: contype="0" conaffinity="0"',
-            compiled.data.geom_xpos[geom],
-        )
-    for geom in np.flatnonzero(~collides & ~np.isin(model.geom_group, (1, 2))):
-        yield compiled.error(
-            "groups",
-            f"geom {compiled.geom_name(int(geom))} does not collide but is in group {model.geom_group[geom]}",
-            "use group 2 for what is only seen (1 for ceilings and lamps), or let it collide",
-            compiled.data.geom_xpos[geom],
-        )
+    solid_remedy = 'use group 0 (seen) or 3 (not seen), or make it visual: contype="0" conaffinity="0"'
+    seen_remedy = "use group 2 for what is only seen (1 for ceilings and lamps), or let it collide"
+    for chosen, groups, what, remedy in (
+        (collides, SOLID_GROUPS, "collides", solid_remedy),
+        (~collides, (1, 2), "does not collide", seen_remedy),
+    ):
+        for geom in np.flatnonzero(chosen & ~np.isin(model.geom_group, groups)):
+            name, place = compiled.geom_name(int(geom)), compiled.data.geom_xpos[geom]
+            message = f"geom {name} {what} but is in group {model.geom_group[geom]}"
+            yield compiled.error("groups", message, remedy, place)
 
 
 def check_contact_bits(compiled: Compiled) -> Iterator[Finding]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.compiled.footprint import bounding_boxes
+from mjsim.house.compiled.rays import DRAWN, Floats, first_hit
 from mjsim.house.validation.checked_model import Compiled
 
 SLACK = 0.004  # depth by which drawn bodies may overlap, such as table legs on a rug, in metres
@@ -16,11 +17,8 @@ FLUSH = 0.0003  # maximum distance between two faces that flicker, in metres
 FLICKER = 1e-4  # minimum area of faces whose flicker is visible, in m^2
 EYES = (1.0, 2.0)  # range of the heights of people's eyes in metres
 GAP = 0.02  # width of a gap that hides the faces in it, in metres
-SEEN = np.array([1, 1, 1, 0, 0, 0], np.uint8)  # geom groups that are drawn
 SHELL = ("structure", "world", "floors")  # last parts of the names of bodies that form walls and floors
 _SAMPLES = np.linspace(-0.45, 0.45, 3)  # positions on a face, relative to its size
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -107,8 +105,7 @@ def _samples(rectangle: tuple[Floats, Floats], axis: int, at: float) -> Iterator
 
 def _is_visible(compiled: Compiled, point: Floats, normal: Floats, low: Floats, high: Floats) -> bool:
     """Return True if a point on a face is neither inside another box nor in a narrow gap."""
-    start, geom = point + 1e-3 * normal, np.zeros(1, np.int32)
+    start = point + 1e-3 * normal
     if ((low < start) & (start < high)).all(axis=1).any():
         return False
-    distance = mujoco.mj_ray(compiled.model, compiled.data, start, normal, SEEN, 1, -1, geom)
-    return not 0 <= distance < GAP
+    return first_hit(compiled.model, compiled.data, start, normal, groups=DRAWN)[0] >= GAP

@@ -87,7 +87,15 @@ def _check_sizes(house: CompiledHouse, footprints: Mapping[str, NDArray[np.float
     for category in house.catalogue.categories.values():
         interior = np.sort(2 * house.receptacles[category.receptacle].half_size[:2])
         sizes = {key: footprints[key] for key in category.objects}
-        yield from _too_large(category.receptacle, interior, sizes)
+        for key, size in sizes.items():
+            if np.any(size > interior):
+                yield Finding(
+                    "capacity",
+                    f"object {key}",
+                    f"its footprint of {size[0]:.2f} x {size[1]:.2f} m does not fit into {category.receptacle!r}, "
+                    f"{interior[0]:.2f} x {interior[1]:.2f} m",
+                    "enlarge the receptacle, shrink the object, or put it into another category",
+                )
         room = float(np.prod(interior)) / float(np.mean([np.prod(size) for size in sizes.values()]))
         if room < SLOTS:
             yield Finding(
@@ -96,18 +104,4 @@ def _check_sizes(house: CompiledHouse, footprints: Mapping[str, NDArray[np.float
                 f"its floor has room for {room:.1f} objects of {category.key!r} side by side",
                 f"enlarge it to {SLOTS} or more: a trial may bring eight",
                 "warning",
-            )
-
-
-def _too_large(
-    receptacle: str, interior: NDArray[np.float64], sizes: Mapping[str, NDArray[np.float64]]
-) -> Iterator[Finding]:
-    for key, size in sizes.items():
-        if np.any(size > interior):
-            sides = " x ".join(f"{s:.2f}" for s in size)
-            yield Finding(
-                "capacity",
-                f"object {key}",
-                f"its footprint of {sides} m does not fit into {receptacle!r}, {interior[0]:.2f} x {interior[1]:.2f} m",
-                "enlarge the receptacle, shrink the object, or put it into another category",
             )

@@ -73,8 +73,10 @@ def _outlines(
         if compiled.model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
             continue
         try:
-            if band is not None and not _reaches(compiled.points(int(geom))[:, 2], band):
-                continue
+            if band is not None:
+                heights = compiled.points(int(geom))[:, 2]
+                if heights.max() <= band[0] or heights.min() >= band[1]:
+                    continue
             rotation = compiled.data.geom_xmat[geom].reshape(3, 3)
             points = outline_points(
                 compiled.model, int(geom), turn @ compiled.data.geom_xpos[geom], turn @ rotation
@@ -83,7 +85,3 @@ def _outlines(
         except (AssetError, QhullError, ValueError):  # Flat or infinite geoms are reported by another rule.
             continue
     return tuple(found)
-
-
-def _reaches(heights: NDArray[np.float64], band: tuple[float, float]) -> bool:
-    return bool(heights.max() > band[0] and heights.min() < band[1])
