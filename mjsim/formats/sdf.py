@@ -11,7 +11,7 @@ import numpy as np
 import trimesh
 
 from mjsim.formats.scene.mesh_colours import PLAIN
-from mjsim.formats.scene.mesh_files import MAX_TRIANGLES, MeshPart, primitive, read_parts
+from mjsim.formats.scene.mesh_files import MAX_TRIANGLES, primitive, read_parts
 from mjsim.formats.scene.source_scene import (
     HouseOptions,
     ImportDecision,
@@ -76,7 +76,7 @@ class _WorldReader:
         self.missing = MissingFiles(options.skip_missing)
         self._unknown: dict[str, int] = {}
         self._count = 0  # number of models that have been read
-        self._meshes: dict[Path, list[MeshPart]] = {}
+        self._meshes: dict[Path, list[ScenePiece]] = {}
 
     def unknown_kinds(self) -> tuple[ImportDecision, ...]:
         return tuple(

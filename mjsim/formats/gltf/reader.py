@@ -24,6 +24,7 @@ from mjsim.formats.scene.source_scene import (
     SourceScene,
     boxes_of,
     left_out,
+    moved,
     numbers,
     unit_of,
 )
@@ -58,7 +59,7 @@ def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
         unit = unit_of(longest) or "m"
         notes.append(ImportDecision("unit", unit, f"then its longest side is {longest * UNITS[unit]:.1f} m"))
     frame = scale_matrix(UNITS[unit or "m"] * options.scale) @ frame
-    pieces = tuple(ScenePiece(p.name, p.surface.moved(frame), p.seen, loose=p.loose) for p in parts)
+    pieces = tuple(moved(parts, frame))
     marks = (
         read_marks(path) if path.suffix.lower() in GLTF and np.allclose(frame, np.eye(4)) else HouseMarks()
     )

@@ -10,7 +10,6 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
@@ -18,7 +17,7 @@ from trimesh.resolvers import FilePathResolver
 from trimesh.transformations import rotation_matrix, scale_matrix
 
 from mjsim.formats.scene.mesh_colours import is_opaque, surface_of
-from mjsim.formats.scene.source_scene import TEXTURE_SIDE
+from mjsim.formats.scene.source_scene import TEXTURE_SIDE, ScenePiece
 from mjsim.formats.scene.surface import Floats, Surface, joined
 from mjsim.support.files import check_input, read_bytes
 from mjsim.values.errors import AssetError
@@ -70,7 +69,9 @@ def read_surface(path: Path) -> Surface:
         geometries = scene.dump()
     meshes = [g for g in geometries if isinstance(g, trimesh.Trimesh) and len(g.faces)]
     if not meshes:
-        raise AssetError(f"{path} {_what_it_has(geometries)}; export it as a mesh of triangles")
+        points = sum(len(g.vertices) for g in geometries if isinstance(g, trimesh.PointCloud))
+        found = f"{points} points and no triangles" if points else "no triangles"
+        raise AssetError(f"{path} has {found}; export it as a mesh of triangles")
     with parsing(path):
         return joined([surface_of(mesh, linear=path.suffix.lower() == ".glb") for mesh in meshes])
 
@@ -134,11 +135,6 @@ def parsing(path: Path) -> Iterator[None]:
         log.setLevel(before)
 
 
-def _what_it_has(geometries: list[Any]) -> str:
-    points = sum(len(g.vertices) for g in geometries if isinstance(g, trimesh.PointCloud))
-    return f"has {points} points and no triangles" if points else "has no triangles"
-
-
 def _named(path: Path, keyword: str) -> list[str]:
     if not path.is_file():
         return []
@@ -147,19 +143,11 @@ def _named(path: Path, keyword: str) -> list[str]:
         return [found[-1] for found in words if len(found) > 1]
 
 
-class MeshPart(NamedTuple):
-    """A part of a mesh file with a single material."""
+def read_parts(path: Path, transform: Floats | None = None) -> list[ScenePiece]:
+    """Read the parts of a mesh file, each with a single material, and apply a transform (4, 4) to them.
 
-    name: str  # name of the node that contains the part
-    surface: Surface
-    seen: bool = True  # False for a translucent part, such as a painted shadow or a pane
-    loose: bool = False  # True if the file marks the part as movable
-
-
-def read_parts(path: Path, transform: Floats | None = None) -> list[MeshPart]:
-    """Read the parts of a mesh file, and apply a transform (4, 4) to them.
-
-    Parts of glTF and COLLADA files are converted to metres with z up. Other formats keep their unit and axes.
+    A part has the name of its node. Translucent parts, such as painted shadows and panes, are not seen. Parts of
+    glTF and COLLADA files are converted to metres with z up. Other formats keep their unit and axes.
 
     Raises:
         AssetError: The file is missing or damaged, or has no triangles.
@@ -183,7 +171,7 @@ def read_parts(path: Path, transform: Floats | None = None) -> list[MeshPart]:
                 known[key] = surface_of(mesh, linear=suffix in GLTF, side=TEXTURE_SIDE)
             surface = known[key].moved(whole @ scene.graph[node][0])
             loose = mesh.metadata.get(LOOSE) is True
-            parts.append(MeshPart(name, surface, is_opaque(mesh), loose))
+            parts.append(ScenePiece(name, surface, is_opaque(mesh), loose=loose))
     if not parts:
         raise AssetError(f"{path} has no triangles; export it as a mesh of triangles")
     return parts
