@@ -37,6 +37,20 @@ _UPRIGHT = np.linalg.inv(Y_TO_Z)
 _CEILING = 2.6  # height of the exported room regions, in metres
 _OBJECT, _SCENE = ".object_config.json", ".scene_instance.json"
 _AIR = 0.05  # clearance between a person's body and walls, in metres
+_DATASET = {
+    "stages": {"paths": {".json": ["stages"]}},
+    "objects": {"paths": {".json": ["objects"]}},
+    "scene_instances": {"paths": {".json": ["scenes"]}},
+    "semantic_scene_descriptor_instances": {"paths": {".json": ["semantics/*"]}},
+}
+_NAVMESH = {
+    "cellSize": 0.05,
+    "cellHeight": 0.05,
+    "agentHeight": 1.8,
+    "agentRadius": round(PersonParameters().body_radius + _AIR, 3),
+    "agentMaxClimb": 0.05,
+    "agentMaxSlope": 45.0,
+}
 
 
 def export_habitat(catalogue: Catalogue, episodes: Sequence[Episode], folder: Path) -> str:
@@ -55,8 +69,8 @@ def export_habitat(catalogue: Catalogue, episodes: Sequence[Episode], folder: Pa
         _save_model(folder / "objects", _slug(key), item.path, "object_config", _template(item.path, {}))
     _save_json(folder / "scenes" / f"{name}{_SCENE}", _scene(house, catalogue, name))
     _save_json(folder / "semantics" / f"{name}{SEMANTICS}", _regions(house))
-    _save_json(folder / f"{name}.scene_dataset_config.json", _dataset())
-    _save_json(folder / "navmesh_settings.json", _navmesh())
+    _save_json(folder / f"{name}.scene_dataset_config.json", _DATASET)
+    _save_json(folder / "navmesh_settings.json", _NAVMESH)
     found = [_episode(house, episode, name, number) for number, episode in enumerate(episodes)]
     content = json.dumps({"episodes": found}, separators=(",", ":")).encode()
     (folder / "episodes.json.gz").write_bytes(gzip.compress(content, mtime=0))
@@ -202,26 +216,6 @@ def _regions(house: CompiledHouse) -> dict[str, Any]:
                 }
             )
     return {"region_annotations": found}
-
-
-def _dataset() -> dict[str, Any]:
-    return {
-        "stages": {"paths": {".json": ["stages"]}},
-        "objects": {"paths": {".json": ["objects"]}},
-        "scene_instances": {"paths": {".json": ["scenes"]}},
-        "semantic_scene_descriptor_instances": {"paths": {".json": ["semantics/*"]}},
-    }
-
-
-def _navmesh() -> dict[str, Any]:
-    return {
-        "cellSize": 0.05,
-        "cellHeight": 0.05,
-        "agentHeight": 1.8,
-        "agentRadius": round(PersonParameters().body_radius + _AIR, 3),
-        "agentMaxClimb": 0.05,
-        "agentMaxSlope": 45.0,
-    }
 
 
 def _episode(house: CompiledHouse, episode: Episode, scene: str, number: int) -> dict[str, Any]:

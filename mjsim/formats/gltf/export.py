@@ -114,7 +114,8 @@ class _Export:
             counts = {"triangles": glb.triangles, "draw_calls": glb.primitives}
             sizes[name] = {**counts, "bytes": len(files[name])}
 
-        add(HOUSE, *self._house())
+        house = Glb(self._images)
+        add(HOUSE, house, self._root(house, self._rooms(house)))
         add(PERSON, *self._person())
         objects = {}
         for placed in self._scene.episode.objects:
@@ -145,15 +146,11 @@ class _Export:
         glb = Glb(self._images)
         nodes = self._rooms(glb)
         for placed in self._scene.episode.objects:
-            position, rotation, quaternion = self._frame(self._scene.index.body(placed.name))
-            inner = glb.mesh(placed.model, self._carried(placed, position, rotation), {LOOSE: True})
+            position, _, quaternion = self._frame(self._scene.index.body(placed.name))
+            inner = glb.mesh(placed.model, self._carried(placed), {LOOSE: True})
             pose = {"translation": position.tolist(), "rotation": np.roll(quaternion, -1).tolist()}
             nodes.append(glb.node(placed.name, [inner], **pose))
         return glb.content(self._root(glb, nodes))
-
-    def _house(self) -> tuple[Glb, int]:
-        glb = Glb(self._images)
-        return glb, self._root(glb, self._rooms(glb))
 
     def _root(self, glb: Glb, nodes: list[int]) -> int:
         extras = {**lights_of(self._drawn), MARKS: self._marks()}
@@ -184,15 +181,15 @@ class _Export:
 
     def _object(self, placed: PlacedObject) -> tuple[Glb, int]:
         glb = Glb(self._images)
-        position, rotation, _ = self._frame(self._scene.index.body(placed.name))
-        mesh = glb.mesh(placed.model, self._carried(placed, position, rotation))
+        mesh = glb.mesh(placed.model, self._carried(placed))
         return glb, glb.node(placed.model, [mesh], rotation=UPRIGHT)
 
-    def _carried(self, placed: PlacedObject, position: Floats, rotation: Floats) -> Iterable[GeomSurface]:
+    def _carried(self, placed: PlacedObject) -> Iterable[GeomSurface]:
         body = self._scene.index.body(placed.name)
         found = self._by_body.get(body, [])
         if not found:
             raise AssetError(f"object {placed.model!r} shows nothing; give it geoms in group 0 to 2")
+        position, rotation, _ = self._frame(body)
         return (surface.within(position, rotation) for surface in found)
 
     def _person(self) -> tuple[Glb, int]:
@@ -235,7 +232,7 @@ class _Export:
 
     def _about(self, placed: PlacedObject) -> dict[str, Any]:
         position, rotation, _ = self._frame(self._scene.index.body(placed.name))
-        points = np.concatenate([s.positions for s in self._carried(placed, position, rotation)])
+        points = np.concatenate([s.positions for s in self._carried(placed)])
         boxes = []
         for surface in self._by_body[self._scene.index.body(placed.name)]:
             geom, box = surface.geom, self._model.geom_aabb[surface.geom]

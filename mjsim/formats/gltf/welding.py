@@ -24,7 +24,8 @@ _Line = tuple[int, int, int]  # axis of a line, and its other two coordinates in
 def welded(model: Any, surfaces: Sequence[GeomSurface]) -> list[GeomSurface]:
     """Split the edges of opaque axis-aligned boxes at the corners of other boxes."""
     corners: dict[_Line, set[int]] = {}
-    boxes = [surface for surface in surfaces if _is_opaque_box(model, surface)]
+    box = mujoco.mjtGeom.mjGEOM_BOX
+    boxes = [s for s in surfaces if model.geom_type[s.geom] == box and not s.is_translucent]
     for surface in boxes:
         for point in np.unique(_units(surface.positions), axis=0).tolist():
             for axis in range(3):
@@ -32,10 +33,6 @@ def welded(model: Any, surfaces: Sequence[GeomSurface]) -> list[GeomSurface]:
     lines = {line: np.array(sorted(values)) for line, values in corners.items() if len(values) > 2}
     welded_boxes = {surface.geom: _welded_box(surface, lines) for surface in boxes}
     return [welded_boxes.get(surface.geom, surface) for surface in surfaces]
-
-
-def _is_opaque_box(model: Any, surface: GeomSurface) -> bool:
-    return model.geom_type[surface.geom] == mujoco.mjtGeom.mjGEOM_BOX and not surface.is_translucent
 
 
 def _units(positions: Floats) -> NDArray[np.int64]:
