@@ -13,7 +13,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import msgspec
 import numpy as np
@@ -123,19 +123,16 @@ def _unzipped(path: Path) -> bytes:
     return content
 
 
-def _unpickled(data: bytes) -> Any:
+def _read_roomr(data: bytes) -> list[EpisodeObject]:
     try:
-        return _NoClass(io.BytesIO(data)).load()
+        content = _NoClass(io.BytesIO(data)).load()
     except EpisodeError:
         raise
     except Exception as error:  # A damaged or malicious pickle can raise any exception.
         raise EpisodeError(
             f"not a pickle of plain values ({type(error).__name__}); is it complete?"
         ) from error
-
-
-def _read_roomr(data: bytes) -> list[EpisodeObject]:
-    scenes = msgspec.convert(_unpickled(data), dict[str, list[_RoomR]])
+    scenes = msgspec.convert(content, dict[str, list[_RoomR]])
     return [
         found
         for scene, episodes in scenes.items()

@@ -41,13 +41,6 @@ _TURNS = ((0.0, (0, 1)), (math.pi, (0, -1)), (math.pi / 2, (-1, 0)), (-math.pi /
 Span = tuple[int, int]  # indices of the first cell and of the cell after the last one
 
 
-@dataclass(frozen=True)
-class _Size:
-    width: float
-    depth: float
-    middle: tuple[float, float]  # centre of the bin's base
-
-
 def place_bins(grid: FloorGrid, rooms: Rooms, catalogue: Catalogue) -> tuple[Bin, ...]:
     """Place as many bins as the floor area allows. Raise an AssetError if no bin fits."""
     rng = np.random.default_rng(0)
@@ -55,8 +48,9 @@ def place_bins(grid: FloorGrid, rooms: Rooms, catalogue: Catalogue) -> tuple[Bin
     wanted = wanted[: max(1, int(grid.area / AREA))]
     bins: list[Bin] = []
     for key in wanted:
-        size = _size(catalogue.receptacles[key])
-        found = _placed(grid, rooms, key, size, [b.room for b in bins], rng)
+        compiled = _compiled(catalogue.receptacles[key])
+        base = compiled.extent(compiled.solid)[:, :2]
+        found = _placed(grid, rooms, key, base, [b.room for b in bins], rng)
         if found is not None:
             place, grid = found
             bins.append(place)
@@ -91,19 +85,13 @@ def _compiled(receptacle: Receptacle) -> Compiled:
     return compiled
 
 
-def _size(receptacle: Receptacle) -> _Size:
-    compiled = _compiled(receptacle)
-    low, high = compiled.extent(compiled.solid)[:, :2]
-    (x, y), (width, depth) = ((low + high) / 2).tolist(), (high - low).tolist()
-    return _Size(width, depth, (x, y))
-
-
 def _placed(
-    grid: FloorGrid, rooms: Rooms, key: str, size: _Size, taken: Sequence[str], rng: np.random.Generator
+    grid: FloorGrid, rooms: Rooms, key: str, base: Floats, taken: Sequence[str], rng: np.random.Generator
 ) -> tuple[Bin, FloorGrid] | None:
     """Place a bin, and return it with the updated grid. Return None if the bin does not fit.
 
-    Prefer rooms in which people would look for the bin, and rooms with few other bins.
+    `base` contains the lower and upper corners of the bin's base (2, 2), in metres. Prefer rooms in which people
+    would look for the bin, and rooms with few other bins.
     """
     numbers = list(range(1, len(rooms.names) + 1))
     homes = _HOMES[key]
@@ -116,9 +104,9 @@ def _placed(
         return taken.count(name) + (home == len(homes)), home, -area
 
     for number in sorted(numbers, key=rank):
-        for turn in _choices(grid, rooms.labels == number, size, rng):
-            if (after := _with_bin(grid, rooms, size, turn)) is not None:
-                x, y, yaw = _origin(grid, size, turn)
+        for turn in _choices(grid, rooms.labels == number, np.ptp(base, axis=0), rng):
+            if (after := _with_bin(grid, rooms, np.ptp(base, axis=0), turn)) is not None:
+                x, y, yaw = _origin(grid, base, turn)
                 return Bin(key, rooms.names[number - 1][0], x, y, yaw), after
     return None
 
@@ -131,7 +119,7 @@ class _Choice:
     back: tuple[int, int]  # direction in which the back of the bin points
 
 
-def _choices(grid: FloorGrid, room: Mask, size: _Size, rng: np.random.Generator) -> list[_Choice]:
+def _choices(grid: FloorGrid, room: Mask, size: Floats, rng: np.random.Generator) -> list[_Choice]:
     free = grid.free & room
     standing = grid.walkable & room
     # Cells outside the house count as walls, because the outer shell is added later.
@@ -139,7 +127,7 @@ def _choices(grid: FloorGrid, room: Mask, size: _Size, rng: np.random.Generator)
     ahead = round(_STAND / CELL)
     found: list[_Choice] = []
     for yaw, back in _TURNS:
-        sides = np.ceil(np.array([size.width + 2 * _ASIDE, size.depth]) / CELL).astype(int).tolist()
+        sides = np.ceil(np.add(size, (2 * _ASIDE, 0.0)) / CELL).astype(int).tolist()
         spans = [(0, side) for side in (sides[::-1] if back[0] else sides)]
         edge = [_beyond(span, way, -1) for span, way in zip(spans, back, strict=True)]
         before = [_beyond(span, -way, ahead) for span, way in zip(spans, back, strict=True)]
@@ -171,11 +159,11 @@ def _at(spans: Sequence[Span], place: Sequence[int]) -> tuple[slice, slice]:
     return x, y
 
 
-def _with_bin(grid: FloorGrid, rooms: Rooms, size: _Size, choice: _Choice) -> FloorGrid | None:
+def _with_bin(grid: FloorGrid, rooms: Rooms, size: Floats, choice: _Choice) -> FloorGrid | None:
     blocked = grid.blocked.copy()
     blocked[choice.cells] = True
     after = replace(grid, blocked=blocked)
-    lost = (size.width + 2 * _WIDE) * (size.depth + 2 * _WIDE) + _LOST
+    lost = np.prod(size + 2 * _WIDE) + _LOST
     if grid.area - after.area > lost or not after.walkable[choice.before].any():
         return None
     for radius in (BODY, _WIDE):
@@ -192,15 +180,15 @@ def _parts(grid: FloorGrid, radius: float) -> int:
     return int((np.bincount(parts.ravel())[1:] * CELL**2 > 0.2).sum())
 
 
-def _origin(grid: FloorGrid, size: _Size, choice: _Choice) -> tuple[float, float, float]:
+def _origin(grid: FloorGrid, base: Floats, choice: _Choice) -> tuple[float, float, float]:
     low = grid.origin + CELL * np.array([choice.cells[0].start, choice.cells[1].start])
     high = grid.origin + CELL * np.array([choice.cells[0].stop, choice.cells[1].stop])
     back = np.array(choice.back, float)
     middle: Floats = (low + high) / 2
-    reach = float(np.abs(back) @ (high - low)) / 2 - size.depth / 2
+    reach = float(np.abs(back) @ (high - low)) / 2 - np.ptp(base, axis=0)[1] / 2
     middle = middle + back * reach
     cos, sin = math.cos(choice.yaw), math.sin(choice.yaw)
-    x, y = size.middle
+    x, y = base.mean(axis=0)
     return float(middle[0] - cos * x + sin * y), float(middle[1] - sin * x - cos * y), choice.yaw
 
 

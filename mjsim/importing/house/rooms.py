@@ -125,7 +125,9 @@ def find_rooms(grid: FloorGrid, given: Sequence[NamedRoom], pieces: Sequence[Sce
     numbered = np.zeros(int(seeds.max()) + 1, np.int32)
     numbered[kept] = np.arange(1, len(kept) + 1)
     floor = _grown(numbered[seeds], region)
-    labels = _within_walls(floor)
+    labels = floor
+    for _ in range(2):  # extend the rooms into their walls
+        labels = np.where(labels == 0, _spread(labels, cv2.MORPH_RECT), labels)
     given_names = [(given[n - 1].key, given[n - 1].label) for n in kept if given]
     names = given_names or _names(labels, len(kept), grid, pieces)
     return Rooms(tuple(names), labels, floor > 0, reason)
@@ -172,12 +174,6 @@ def _grown(seeds: NDArray[np.integer], region: Mask) -> Labels:
         if np.array_equal(fresh, labels):
             return labels
         labels = fresh
-
-
-def _within_walls(labels: Labels) -> Labels:
-    for _ in range(2):
-        labels = np.where(labels == 0, _spread(labels, cv2.MORPH_RECT), labels)
-    return labels
 
 
 def _names(

@@ -94,7 +94,10 @@ def add_mesh(
         except RenderError as error:
             decisions.append(ImportDecision("preview", "none", str(error)))
         if reason := _not_held(item, check_object(model, entry.key)):
-            shown = _keep_picture(folder, extension.folder / f"{entry.key}-{PREVIEW}")
+            shown = ""
+            if (folder / PREVIEW).exists():
+                kept = (folder / PREVIEW).replace(extension.folder / f"{entry.key}-{PREVIEW}")
+                shown = f" ({kept} shows it)"
             raise AssetError(f"{path}: this shape cannot be held: {reason}{shown}")
         text = json.dumps([asdict(decision) for decision in decisions], indent=2, ensure_ascii=False)
         (folder / REPORT).write_text(text + "\n", encoding="utf-8")
@@ -113,10 +116,3 @@ def _not_held(item: ImportedObject, findings: list[Finding]) -> str:
         f"its top is {100 * item.grip.offset:.0f} cm beside its centre of mass, and a hand takes it there from above "
         f"(at most {100 * MAX_OFFSET:.0f} cm); turn or change it so that its top is nearer, or use --scale"
     )
-
-
-def _keep_picture(folder: Path, target: Path) -> str:
-    if not (folder / PREVIEW).exists():
-        return ""
-    (folder / PREVIEW).replace(target)
-    return f" ({target} shows it)"
