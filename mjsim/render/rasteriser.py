@@ -1,6 +1,7 @@
 """The rasteriser, which draws colour images, geom ids and depth images of a model."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple, Self
 
 import cv2
@@ -126,10 +127,8 @@ class Rasteriser:
 
     def colour(self, view: ViewVolume, markers: Sequence[MarkerLike] = ()) -> NDArray[np.uint8]:
         """Draw a colour image (height, width, 3) of the latest state, with the top row first."""
-        scene, model_geoms = self._scene, self._scene.ngeom
-        set_flags(scene, self._profile)
-        view.aim(scene)
-        try:
+        set_flags(self._scene, self._profile)
+        with self._aimed(view) as scene:
             if self._shadows is not None:
                 self._shadows.add(scene, view, self._aspect, self._positions, self._rotations)
             shown = in_view(view, self._aspect, markers)
@@ -137,20 +136,17 @@ class Rasteriser:
             with context.current_context(), without(scene, self._unseen(view, self._profile)):
                 self._draw(scene, self._drawn, self._colour, None)
                 self._add_x_ray(view, [marker for marker in shown if marker.x_ray])
-        finally:
-            scene.ngeom = model_geoms
         return reduced(self._colour, self._size)
 
     def geometry(
         self, view: ViewVolume, markers: Sequence[MarkerLike] = ()
     ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Draw geom ids and reversed depths, both (height, width). The background and markers have id -1."""
-        scene, model_geoms = self._scene, self._scene.ngeom
-        scene.flags[:] = 0
+        model_geoms = self._scene.ngeom
+        self._scene.flags[:] = 0
         for flag in (_Flag.mjRND_SEGMENT, _Flag.mjRND_IDCOLOR, _Flag.mjRND_CULL_FACE):
-            scene.flags[flag] = 1
-        view.aim(scene)
-        try:
+            self._scene.flags[flag] = 1
+        with self._aimed(view) as scene:
             add_markers(scene, markers)
             geoms = scene.geoms[: scene.ngeom]
             for index in range(model_geoms, scene.ngeom):
@@ -161,8 +157,6 @@ class Rasteriser:
             table = np.array(owners, dtype=np.int32)
             with context.current_context(), without(scene, self._unseen(view)):
                 self._draw(scene, self._size, self._ids, self._depth)
-        finally:
-            scene.ngeom = model_geoms
         packed = cv2.flip(self._ids, 0).astype(np.int32)
         ids = table[packed[..., 0] | packed[..., 1] << 8 | packed[..., 2] << 16]
         return ids, np.asarray(cv2.flip(self._depth, 0), dtype=np.float32)
@@ -176,21 +170,27 @@ class Rasteriser:
         lowest: bool = False,
     ) -> Layer:
         """Draw the scene without `hidden` geoms. Only the `lowest` layer contains sky and contact shadows."""
-        scene, model_geoms = self._scene, self._scene.ngeom
-        set_flags(scene, self._profile)
-        scene.flags[_Flag.mjRND_SKYBOX] &= lowest
-        view.aim(scene)
+        set_flags(self._scene, self._profile)
+        self._scene.flags[_Flag.mjRND_SKYBOX] &= lowest
         layer = Layer(np.empty_like(self._colour), np.empty(self._colour.shape[:2], np.float32))
-        try:
+        with self._aimed(view) as scene:
             if lowest and self._shadows is not None:
                 away = np.where(hidden[:, None], _FAR_UP, self._positions)
                 self._shadows.add(scene, view, self._aspect, away, self._rotations)
             add_markers(scene, in_view(view, self._aspect, markers))
             with without(scene, hidden | self._unseen(view, self._profile)):
                 self._draw(scene, self._drawn, layer.colour, layer.depth)
-        finally:
-            scene.ngeom = model_geoms
         return layer
+
+    @contextmanager
+    def _aimed(self, view: ViewVolume) -> Iterator[Any]:
+        """Aim the scene at a view, and remove the geoms that were added to it afterwards."""
+        geoms = self._scene.ngeom
+        view.aim(self._scene)
+        try:
+            yield self._scene
+        finally:
+            self._scene.ngeom = geoms
 
     @property
     def _aspect(self) -> float:
