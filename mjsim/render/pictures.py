@@ -95,7 +95,11 @@ def draw_picture(model: Any, size: int, name: str) -> NDArray[np.uint8]:
 
 
 def _first_view(model: Any, data: Any) -> ViewVolume:
-    low, high = _bounds(model, data)
+    shown = np.isin(model.geom_group, FIRST_PERSON_GROUPS)
+    if not shown.any():
+        raise RenderError("a model without geoms in the groups 0 to 2 has no picture; add visual geoms")
+    lows, highs = bounding_boxes(model, data, shown)
+    low, high = lows.min(axis=0), highs.max(axis=0)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     flat = (high - low)[2] < _FLAT * max((high - low)[:2])
     elevation = _ELEVATION_FLAT if flat else _ELEVATION
@@ -109,14 +113,6 @@ def _first_view(model: Any, data: Any) -> ViewVolume:
         far=2 * _DISTANCE,
         orthographic=True,
     )
-
-
-def _bounds(model: Any, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    shown = np.isin(model.geom_group, FIRST_PERSON_GROUPS)
-    if not shown.any():
-        raise RenderError("a model without geoms in the groups 0 to 2 has no picture; add visual geoms")
-    low, high = bounding_boxes(model, data, shown)
-    return low.min(axis=0), high.max(axis=0)
 
 
 def _framed(rasteriser: Rasteriser, view: ViewVolume, name: str) -> ViewVolume:
@@ -201,15 +197,12 @@ def render_floorplan(
     rasteriser = Rasteriser(model, width, height, _PLAN_PROFILE, TOP_DOWN_GROUPS, _PLAN_LIGHTS)
     with rasteriser, current_context():
         rasteriser.update(data)
-        drawn = rasteriser.layer(view, hidden=_person_geoms(model), lowest=True)
+        base = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, avatar.BASE)
+        person = (model.body_rootid[model.geom_bodyid] == base) & (base >= 0)
+        drawn = rasteriser.layer(view, hidden=person, lowest=True)
         rgb = reduced(drawn.colour, rasteriser.size)
         rgb[rasteriser.geometry(view)[0] < 0] = _PAPER
     return FloorPlan(rgb, (xmin, ymin, xmax, ymax), pixels_per_metre)
-
-
-def _person_geoms(model: Any) -> NDArray[np.bool_]:
-    base = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, avatar.BASE)
-    return np.asarray((model.body_rootid[model.geom_bodyid] == base) & (base >= 0))
 
 
 def _overhead_geoms(model: Any, data: Any) -> NDArray[np.bool_]:

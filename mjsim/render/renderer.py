@@ -104,8 +104,7 @@ class Renderer(OffScreenRenderer):
             markers: Markers to draw. A marker behind a geom is hidden unless it is an x-ray marker.
         """
         with context.current_context():
-            view = self._look(data, camera)
-            return self._rasteriser.colour(view, markers)
+            return self._rasteriser.colour(self._look(data, camera), markers)
 
     def depth(
         self, data: Any, camera: str | CameraPose = EYE, markers: Sequence[MarkerLike] = ()

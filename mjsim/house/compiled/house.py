@@ -93,7 +93,8 @@ def separate_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     body = spec.body("object")
     groups: list[tuple[Any, list[Any]]] = []
     for geom in body.geoms:
-        if not _is_visual(geom) or (geom.frame and geom.frame.frame):
+        is_visual = not geom.contype and not geom.conaffinity and geom.mass == 0.0
+        if not is_visual or (geom.frame and geom.frame.frame):
             continue
         group = next((members for frame, members in groups if frame == geom.frame), None)
         if group is None:
@@ -128,10 +129,6 @@ def _move(spec: mujoco.MjSpec, geoms: list[Any], frame: Any, body: Any) -> None:
     spec.delete(frame)
     for geom, name in zip(body.geoms[before:], names, strict=True):
         geom.name = name
-
-
-def _is_visual(geom: Any) -> bool:
-    return not geom.contype and not geom.conaffinity and geom.mass == 0.0
 
 
 class CompiledHouse:

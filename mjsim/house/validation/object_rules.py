@@ -136,11 +136,10 @@ def _grips(compiled: Compiled) -> Iterator[Finding]:
     for name, site in zip(GRIPS, sites, strict=True):
         if site is None:
             yield compiled.error("grips", f"has no site {name!r}", f"add <site name={name!r}> at its top")
-    low, high = compiled.extent(compiled.solid)
     frames = [compiled.data.site_xmat[s].reshape(3, 3) for s in sites if s is not None]
     for name, site in zip(GRIPS, sites, strict=True):
         if site is not None:
-            yield from _grip(compiled, name, compiled.data.site_xpos[site], (low, high))
+            yield from _grip(compiled, name, compiled.data.site_xpos[site])
     for name, frame in zip(GRIPS, frames, strict=False):
         if frame[2, 2] < UPRIGHT:
             yield compiled.error("grips", f"the z axis of {name} does not point up", "turn about z only")
@@ -152,13 +151,8 @@ def _grips(compiled: Compiled) -> Iterator[Finding]:
         )
 
 
-def _grip(
-    compiled: Compiled,
-    name: str,
-    at: NDArray[np.float64],
-    box: tuple[NDArray[np.float64], NDArray[np.float64]],
-) -> Iterator[Finding]:
-    low, high = box
+def _grip(compiled: Compiled, name: str, at: NDArray[np.float64]) -> Iterator[Finding]:
+    low, high = compiled.extent(compiled.solid)
     beside = np.maximum(np.maximum(low - at, at - high), 0.0)[:2]
     top = float(high[2])
     if np.hypot(*beside) > 1e-3 or abs(at[2] - top) > GRIP_GAP:
