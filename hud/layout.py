@@ -43,7 +43,7 @@ class ListRow:
 
 @dataclass(frozen=True)
 class Layout:
-    """The rectangles of all panels in a frame, and the rows and lines of text in the panels."""
+    """The rectangles of all panels in a frame, and the text that fits into the panels."""
 
     panels: Mapping[str, Rect]  # rectangles of the visible panels by name, in drawing order
     free: Rect  # area between the panels, which no panel covers

@@ -63,10 +63,10 @@ class Approach:
     def end(
         self, path: NDArray[np.float64], goal: Goal, stop_distance: float
     ) -> tuple[NDArray[np.float64], float]:
-        """Return the path and the stopping distance of a walk that ends where the reach to a goal is free.
+        """Return the path and stopping distance of a walk to a place from which nothing obstructs the reach.
 
         The walk normally ends as soon as the person is within `stop_distance` of the goal. If a wall is in the
-        way there, the path is cut at a suitable place beyond. If there is none, nothing changes.
+        way there, the path is cut at a suitable place beyond. If there is no such place, nothing changes.
         """
         key = (*middle(goal).tolist(), stop_distance)
         if self._walk is None or self._walk[0] is not path or self._walk[1] != key:

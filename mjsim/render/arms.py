@@ -15,7 +15,7 @@ class _Arm(NamedTuple):
     hand: int  # body of the hand
     geoms: NDArray[np.intp]  # visible geoms of the hand without the sleeve
     sleeve: int
-    rest: tuple[float, float, float]  # rest posture of the hand, in metres
+    rest: tuple[float, float, float]  # position of the hand at rest, in metres
 
 
 class Arms:

@@ -14,7 +14,7 @@ _HEALTH = 7  # number of values in a `HealthSample`
 
 
 class ObjectStatus(enum.Enum):
-    """The status of an object, which is on the floor, in a hand or in its receptacle."""
+    """The status of an object: loose, carried in a hand, or delivered to its receptacle."""
 
     LOOSE = "loose"
     CARRIED = "carried"

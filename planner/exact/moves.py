@@ -41,7 +41,7 @@ class Moves(NamedTuple):
 def moves_of(inst: Instance) -> Moves:
     n, m = inst.to_bin.shape
     bins, objects, root, carried = np.arange(m), np.arange(n), m * m + n, inst.carried
-    # Bin of the object in hand at each place, and the places where there is one
+    # Bin of the object in hand at each place, and the places with an object in hand
     held = np.concatenate([np.tile(bins, m), inst.home, carried if carried.size == 1 else [NOTHING]])
     held[bins * (m + 1)] = NOTHING
     busy = np.flatnonzero(held != NOTHING)

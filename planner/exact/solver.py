@@ -147,7 +147,10 @@ class ExactSolver:
             yield from tours_by_cuts(instance, seed, work, deadline, solution)
 
     def uses_cuts(self, instance: Instance) -> bool:
-        """Return True if branch and cut solves an instance. With up to 40 objects, it must be able to prove a tour."""
+        """Return True if branch and cut should solve an instance.
+
+        With up to 40 objects, it is only used if its distances are exact enough to prove that a tour is shortest.
+        """
         n, m = instance.to_bin.shape
         exact = instance.tie == 0 and longest(instance) <= LONGEST
         return n > MAX_SEARCHED or (n > self.most_searched and exact and n * m * m <= MAX_ARCS)

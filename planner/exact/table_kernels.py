@@ -121,7 +121,7 @@ def legs_of(inst: Instance, table: CostTable) -> Legs:
 
 @kernel
 def left_of(table: CostTable, row: int) -> NDArray[np.int64]:
-    """Return the number of objects of each group that remain in a table row, shape (groups,)."""
+    """Return how many objects of each group still have to be picked up in the state of a table row, shape (groups,)."""
     left = np.empty(table.size.size, np.int64)
     for g in range(left.size):
         left[g] = row % (table.size[g] + 1)

@@ -14,7 +14,7 @@ from planner.solvers import Deadline, SolveLimit
 
 TASK_WORK = 3_000_000  # default number of states that all searches of a task expand together
 TABLE_OBJECTS = 18  # number of objects from which on a full table replaces the searches
-PAUSE = 2  # number of objects that must be picked up before a search after one without a proof
+PAUSE = 2  # number of picks after which the search is repeated if the last one proved nothing
 HURRIED_ROWS = 600  # maximum number of rows in a table that is filled after the search was stopped
 SEARCHES = 2  # number of searches per object, one after it is picked up and one after it is placed
 # Annealing of an earlier tour with more than 24 objects, and the number of rows in the table that bounds it

@@ -204,7 +204,7 @@ class LogSource(PlanSource):
         return self._is_due and bool(self._plans[0].get("improved", False))
 
     def better(self, state: TaskState, route: Route) -> Route | None:
-        """Return the better plan that was logged at the current time, or None if there is none."""
+        """Return the improved plan if one was logged at the current time. Otherwise, return None."""
         return self.plan(state, route, shown=True) if self.pending else None
 
     @property

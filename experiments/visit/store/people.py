@@ -109,7 +109,7 @@ class People(StorePart):
 
     @transaction
     async def set_known(self, connection: Connection, known: Mapping[int, bool], who: str) -> None:
-        """Record if the recruitment platform knows each participant, as the answer `known` in `recruitment`."""
+        """Store whether the platform knows each participant, as the answer to item `known` of phase `recruitment`."""
         now = utc_now()
         given = {"phase": "recruitment", "item": "known", "given": now, "final": True}
         mine = (

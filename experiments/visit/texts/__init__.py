@@ -49,7 +49,7 @@ def languages() -> tuple[str, ...]:
 
 
 def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> Texts:
-    """Read the texts of a language. A study's own file may replace some of them.
+    """Read the text of all pages in a language. A study's own file may replace some of it.
 
     Args:
         language: Language tag. If the project has no file for the language, `path` must contain all texts.

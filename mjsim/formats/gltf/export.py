@@ -211,7 +211,7 @@ class _Export:
         return glb, glb.node("person", [glb.node("body", nodes)], rotation=UPRIGHT)
 
     def _arm(self, hand: int, sleeve: int) -> dict[str, Any]:
-        """Return the parameters with which a client poses an arm, as `arm_pose` does."""
+        """Return the parameters that a client needs to compute the same poses of an arm as `arm_pose`."""
         eye_height = self._scene.person.eye_height
         rest = avatar.posture(hand, avatar.REST, eye_height)
         side = np.array([1.0, math.copysign(1.0, rest[1]), 1.0])

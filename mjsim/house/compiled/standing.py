@@ -51,9 +51,9 @@ class StandingPlaces:
         return cls(house.model, house.data, house.rooms, navigable, person)
 
     def suits(self, stand: Point, goal: Goal) -> bool:
-        """Return True if the straight reach to a goal is free, and a receptacle is not used from a doorway.
+        """Return True if nothing obstructs a straight reach from a place to a goal.
 
-        Objects may be picked up from a doorway, because they may lie in it.
+        The place must not be in a doorway if the goal is a receptacle. Objects may be in the doorway themselves.
         """
         if isinstance(goal, ReceptacleGeometry):
             return self.is_free(stand, goal) and not self.in_doorway(stand)

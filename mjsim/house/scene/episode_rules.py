@@ -86,7 +86,7 @@ def check_poses(episode: Episode, rooms: RoomMap) -> Iterator[Finding]:
 
 
 def _pose_faults(placed: PlacedObject, rooms: RoomMap) -> Iterator[tuple[str, str]]:
-    """Yield the message and the remedy of each fault in the pose of an object."""
+    """Yield a message and a hint for each fault in an object's pose."""
     norm, (x, y, z) = float(np.linalg.norm(placed.quaternion)), placed.position
     if abs(norm - 1.0) > UNIT:
         message = f"has the quaternion {list(placed.quaternion)} of norm {norm:.3g}"

@@ -121,7 +121,7 @@ def _bodies(mesh: trimesh.Trimesh) -> NDArray[np.int_]:
 
 
 def _together(meshes: list[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
-    """Merge the parts of a piece of furniture if there are many, such as the keys of a keyboard."""
+    """Merge the parts of a piece of furniture if it has many of them, such as the keys of a piano."""
     if len(meshes) <= _FEW or not _compact(np.ptp([m.bounds for m in meshes], axis=(0, 1))):
         return meshes
     return [trimesh.util.concatenate(meshes)]

@@ -1,4 +1,4 @@
-"""Close the holes of surfaces, and compute the mass of the closed bodies."""
+"""Close holes in surfaces, and compute the mass of the closed bodies."""
 
 from dataclasses import dataclass
 

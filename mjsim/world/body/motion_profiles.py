@@ -35,7 +35,7 @@ def progress(phase: float, order: int, lead: float) -> tuple[float, float]:
 def point_between(
     start: NDArray[np.float64], goal: NDArray[np.float64], phase: float, order: int, lead: float
 ) -> NDArray[np.float64]:
-    """Return the position (3,) of a hand at a phase from 0 to 1 of its movement from `start` to `goal`."""
+    """Return the position (3,) of a hand that moves from `start` to `goal`. The phase increases from 0 to 1."""
     across, up = progress(phase, order, lead)
     point = np.empty(3)
     for axis in range(3):

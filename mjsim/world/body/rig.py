@@ -70,7 +70,7 @@ class Rig:
         self.reset()
 
     def reset(self) -> None:
-        """Set the commands so that the person stands still in the current pose."""
+        """Set the commands so that the person stops in the current pose."""
         self.motion[:] = 0.0, 0.0, 0.0, self.pose[3]
         self.hand_targets[:] = self.pose[4:].reshape(2, 3)
         self._last_hand_targets[:] = self.hand_targets

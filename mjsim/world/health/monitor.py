@@ -137,7 +137,7 @@ class HealthMonitor:
         self._settling.reset()
 
     def check(self, held: Sequence[int | None]) -> Sequence[tuple[EventKind, int]]:
-        """Check the latest control step. Return ejections and tunnelling, each with the index of its object.
+        """Check the latest control step. Return an event for each ejected or tunnelling object, with its index.
 
         Raises:
             PhysicsError: MuJoCo reported a warning, or a position or velocity is not finite.
