@@ -306,7 +306,7 @@ def test_the_tables_of_fields_are_complete():
         "answer",
         "blocked",
     }
-    percept = fields_in_table("participants.md", "named by the keys of the episode")
+    percept = fields_in_table("participants.md", "A `Percept` has the following fields")
     assert percept == public(Percept) | by_init | {"person"}
     assert fields_in_table("hud.md", "A `TaskView` contains everything") == public(TaskView)
     assert fields_in_table("study-file.md", "For a page of another kind") == public(Phase) | {"example"}
