@@ -16,6 +16,7 @@ from experiments.trials import batch_folder, trial_reader
 from experiments.trials.batch import run_batch
 from experiments.trials.batch_folder import read_trial
 from experiments.trials.design import Design
+from experiments.trials.fingerprint import code_versions
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_reader import ROWS, TrialReader
@@ -72,6 +73,7 @@ def test_metrics_of_the_same_versions_are_read_and_others_are_computed(folder, m
         return measure(*given)
 
     monkeypatch.setattr(batch_folder, "measure", measured)
+    monkeypatch.setattr(batch_folder, "_versions", code_versions)  # not those cached by another test
     found = read_trial(path)
     assert not computed and found.as_measured
     again = read_trial(path, recompute=True)
