@@ -166,7 +166,8 @@ class Space:
     def reachable(self, places: Sequence[Point]) -> list[Point]:
         """Return the places on furniture from which a person can take an object without bending around things."""
         floor, (_, islands) = self.room.floor, _islands(self._distance(self.hit, _FINE), STANDING)
-        largest = np.bincount(islands.ravel(), minlength=2)[1:].argmax() + 1  # others are tolerated pockets
+        # Smaller parts of the floor are pockets to which there is no way.
+        largest = np.bincount(islands.ravel(), minlength=2)[1:].argmax() + 1
         cells = (np.argwhere(islands == largest) - 0.5) * _FINE + (floor.x0, floor.y0)
         steps, found = np.linspace(0.0, 1.0, 9)[:, None], []
         for place in places:

@@ -16,7 +16,7 @@ from mjsim.support.kernels import kernel
 
 MAX_SPEED = 1.0  # downward speed of a part of an object above which the object is falling, in m/s
 MAX_SWING = 2.0  # speed of a carried object above which it swings around the hand, in m/s
-MAX_MEETING = 1.4  # relative speed above which two carried objects may meet hard, in m/s
+MAX_MEETING = 1.4  # relative speed of two carried objects above which physics steps are shortened, in m/s
 Floats = NDArray[np.float64]
 
 

@@ -117,7 +117,7 @@ def square_heading(person: Person, hand: int, receptacle: ReceptacleGeometry) ->
     quarter = math.pi / 2
     quarters = round(wrap(towards - side) / quarter)
     sign = 1.0 - 2.0 * hand
-    left = wrap(towards - side - quarter * quarters)  # angle from the heading to the receptacle
+    left = wrap(towards - side - quarter * quarters)  # angle to the receptacle, positive to the left
     if -sign * left > _MAX_ACROSS and person.held[1 - hand] is not None:
         quarters -= round(sign)
     return rig.heading + wrap(side + quarter * quarters - rig.heading)
