@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.compiled.footprint import ClearanceField
-from mjsim.house.compiled.house import compiled_house
 from mjsim.house.scene import avatar
 from mjsim.house.scene.avatar import LEFT, RIGHT
 from mjsim.house.scene.scene import Scene
@@ -30,7 +29,6 @@ Floats = NDArray[np.float64]
 MAX_SERVO_LAG = 0.25
 # Strain of a hand in a control step in which it yields as far as it can, relative to that of a stretched weld
 YIELDING = 0.04
-LOW, HIGH = 0.93, 1.60  # range of heights of carried objects, in metres
 _NO_GEOMS, _NO_FRAMES = np.zeros((0, 2), np.int32), np.zeros((0, 9))
 _HOUSE, _PERSON = -1, -2  # owner numbers of geoms that do not belong to an object
 
@@ -86,9 +84,6 @@ class Carrying:
     def __init__(self, person: Person) -> None:
         scene, rig = person.scene, person.rig
         self._person = person
-        self.clearance: ClearanceField = compiled_house(scene.catalogue).cached(
-            "carry clearance", lambda: ClearanceField.from_model(scene.model, low=LOW, high=HIGH)
-        )
         # Horizontal radius and downward extent of each object from its grip, in metres, shape (n, 2).
         self.loads = np.array([_load(person, item) for item in range(len(scene.index.names))]).reshape(-1, 2)
         self._owners = _geom_owners(scene)
@@ -98,7 +93,7 @@ class Carrying:
         self._postures = {p: np.array(avatar.posture(LEFT, p, eyes)) for p in postures}
         self._compliance = np.zeros((2, 2))
         targets, rest = rig.hand_targets, np.array(avatar.posture(LEFT, avatar.REST, eyes))
-        self._body = (rig.pose, rig.motion, tuple(self.clearance))
+        self._body = (rig.pose, rig.motion, tuple(person.clearance))
         self._hands = (
             targets, person.hand_velocities, self._compliance, np.zeros((2, 3)), rest, self.loads,
             person.posture_pace,
@@ -132,7 +127,7 @@ class Carrying:
         radius, height = self.loads[item].tolist()
         forward, left, up = avatar.posture(hand, avatar.CARRY, self._person.parameters.eye_height)
         rig, carrying = self._person.rig, self._person.parameters.carrying
-        body = body or BodyMotion(rig.pose, rig.motion, self.clearance)
+        body = body or BodyMotion(rig.pose, rig.motion, self._person.clearance)
         point = drawn_in(forward, left, radius, body, carrying)
         return np.array([*point, max(up, carrying.least_height + height)])
 

@@ -1,7 +1,7 @@
 """A detector of fast objects, for which physics steps are shortened.
 
 In one physics step of 4 ms, an object that has fallen from a hand moves by 2 cm, so it would sink that far into the
-floor before MuJoCo detects a contact. The same holds for a load that swings around a hand against furniture.
+floor before MuJoCo detects a contact. The same holds for a load that swings around a hand towards furniture.
 """
 
 import math
@@ -11,34 +11,46 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.house.compiled.footprint import ClearanceField, clearance_at
 from mjsim.house.scene.scene import SceneIndex
 from mjsim.support.kernels import kernel
 
 MAX_SPEED = 1.0  # downward speed of a part of an object above which the object is falling, in m/s
-MAX_SWING = 2.0  # speed of a carried object above which it swings around the hand, in m/s
+# Speed at which a carried object may hit furniture in a physics step of full length, in m/s
+MAX_APPROACH = 1.0
+# Distance by which an approaching object may come closer than expected in a control step, in metres
+APPROACH_MARGIN = 0.03
 MAX_MEETING = 1.4  # relative speed of two carried objects above which physics steps are shortened, in m/s
 Floats = NDArray[np.float64]
 
 
 class FallDetector:
-    """A detector of falling or tumbling objects."""
+    """A detector of falling or tumbling objects, and of carried objects that are about to hit something."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, index: SceneIndex) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        index: SceneIndex,
+        clearance: ClearanceField,
+        control_timestep: float,
+    ) -> None:
         geoms = np.flatnonzero((index.geom_owner >= 0) & ((model.geom_contype | model.geom_conaffinity) > 0))
         radii = np.zeros(len(index.names))  # largest distance of a part from the origin of its body
         extents = np.linalg.norm(model.geom_pos[geoms], axis=1) + model.geom_rbound[geoms]
         np.maximum.at(radii, index.geom_owner[geoms], extents)
-        self._arrays = (data.qvel, data.xmat, index.dofs, index.bodies, radii)
+        self._arrays = (data.qvel, data.xpos, data.xmat, index.dofs, index.bodies, radii)
+        self._surroundings = (tuple(clearance), control_timestep)
 
     def detects(self, gripped: tuple[int, ...]) -> bool:
-        """Return True if a `gripped` object swings or meets another, or a loose object falls or tumbles fast."""
+        """Return True if a `gripped` object may soon hit furniture or another one, or a loose object falls fast."""
         first, second = (*gripped, -1, -1)[:2]
-        return bool(_falls(self._arrays, first, second))
+        return bool(_detects(self._arrays, self._surroundings, first, second))
 
 
 @kernel
-def _falls(arrays: Any, first: int, second: int) -> bool:
-    qvel, xmat, dofs, bodies, radii = arrays
+def _detects(arrays: Any, surroundings: Any, first: int, second: int) -> bool:
+    qvel, xpos, xmat, dofs, bodies, radii = arrays
     if first >= 0 and second >= 0:
         meeting = 0.0
         for axis in range(3):
@@ -48,7 +60,7 @@ def _falls(arrays: Any, first: int, second: int) -> bool:
     for item in range(len(dofs)):
         dof = dofs[item]
         if item in (first, second):
-            if qvel[dof] ** 2 + qvel[dof + 1] ** 2 + qvel[dof + 2] ** 2 > MAX_SWING**2:
+            if _approaches(xpos[bodies[item]], qvel[dof : dof + 2], radii[item], surroundings):
                 return True
             continue
         square = upright = 0.0
@@ -60,3 +72,12 @@ def _falls(arrays: Any, first: int, second: int) -> bool:
         if tumbling * radii[item] - qvel[dof + 2] > MAX_SPEED:
             return True
     return False
+
+
+@kernel
+def _approaches(position: Floats, velocity: Floats, radius: float, surroundings: Any) -> bool:
+    """Return True if an object moves fast towards furniture that it can reach within the next control step."""
+    clearance, dt = surroundings
+    room, away_x, away_y = clearance_at(position[0], position[1], ClearanceField(*clearance))
+    approach = -(velocity[0] * away_x + velocity[1] * away_y)
+    return bool(approach > MAX_APPROACH and room - radius < approach * dt + APPROACH_MARGIN)

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.compiled.footprint import ClearanceField, clearance_at
+from mjsim.house.compiled.house import compiled_house
+from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel
 from mjsim.values.motion_parameters import CarryingParameters
 
@@ -20,6 +22,7 @@ Floats = NDArray[np.float64]
 X, Y, HEADING = 0, 1, 2
 FORWARD, LEFT, TURN = 0, 1, 2
 
+LOW, HIGH = 0.93, 1.60  # range of heights of carried objects, in metres
 ROUNDS = 3
 # Candidate positions of a hand, as fractions of the distance from the body's axis to the posture.
 EXTENSIONS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -31,6 +34,13 @@ class BodyMotion(NamedTuple):
     pose: Floats  # starts with x, y (metres) and heading (radians), shape (10,) or longer
     command: Floats  # starts with forward and left velocity (m/s) and yaw rate (rad/s), shape (3,) or longer
     clearance: ClearanceField  # clearance at the heights of carried objects
+
+
+def carry_clearance(scene: Scene) -> ClearanceField:
+    """Return the clearance field of a house at the heights of carried objects."""
+    return compiled_house(scene.catalogue).cached(
+        "carry clearance", lambda: ClearanceField.from_model(scene.model, low=LOW, high=HIGH)
+    )
 
 
 @kernel

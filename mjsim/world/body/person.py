@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.house.compiled.footprint import ClearanceField
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene
 from mjsim.house.sight.receptacle_heights import ReceptacleHeights
@@ -17,6 +18,7 @@ from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.body.falls import FallDetector
 from mjsim.world.body.grips import Grips
+from mjsim.world.body.load_room import carry_clearance
 from mjsim.world.body.motion_profiles import change_pitch, change_turn_rate, change_velocity, point_between
 from mjsim.world.body.postures import move_hand, posture_pace
 from mjsim.world.body.rig import Rig
@@ -46,12 +48,16 @@ class Person:
     hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
     moving_hand: int | None = None  # index of the hand with a motion, or None
     receptacle_heights: ReceptacleHeights = field(init=False)
+    clearance: ClearanceField = field(init=False)  # clearance at the heights of carried objects
     fall_detector: FallDetector = field(init=False)
     posture_pace: NDArray[np.float64] = field(init=False)  # see `Hands.pace` in `mjsim.world.body.postures`
 
     def __post_init__(self) -> None:
         self.receptacle_heights = ReceptacleHeights(self.scene)
-        self.fall_detector = FallDetector(self.scene.model, self.data, self.scene.index)
+        self.clearance = carry_clearance(self.scene)
+        self.fall_detector = FallDetector(
+            self.scene.model, self.data, self.scene.index, self.clearance, self.dt
+        )
         self.posture_pace = posture_pace(self.motion)
 
     @property

@@ -71,7 +71,7 @@ class KinematicWorld:
                     for place in (avatar.REST, avatar.CARRY, avatar.TUCKED, avatar.ASIDE)
                 ]
             ),
-            clearance=carrying.clearance,
+            clearance=full.person.clearance,
             timestep=float(scene.model.opt.timestep),
             compliance=np.zeros((2, 2)),
             goals=np.zeros((2, 3)),
