@@ -18,9 +18,11 @@ from mjsim.support.kernels import kernel
 MAX_SPEED = 1.0  # downward speed of a part of an object above which the object is falling, in m/s
 # Speed at which a carried object may hit furniture in a physics step of full length, in m/s
 MAX_APPROACH = 1.0
-# Distance by which an approaching object may come closer than expected in a control step, in metres
-APPROACH_MARGIN = 0.03
-MAX_MEETING = 1.4  # relative speed of two carried objects above which physics steps are shortened, in m/s
+# Speed at which two carried objects may hit each other in a physics step of full length, in m/s. Two hands press them
+# together, so that they overlap more.
+MAX_MEETING = 0.4
+# Distance by which objects may come closer than expected in a control step, in metres
+MARGIN = 0.03
 Floats = NDArray[np.float64]
 
 
@@ -51,12 +53,8 @@ class FallDetector:
 @kernel
 def _detects(arrays: Any, surroundings: Any, first: int, second: int) -> bool:
     qvel, xpos, xmat, dofs, bodies, radii = arrays
-    if first >= 0 and second >= 0:
-        meeting = 0.0
-        for axis in range(3):
-            meeting += (qvel[dofs[first] + axis] - qvel[dofs[second] + axis]) ** 2
-        if meeting > MAX_MEETING**2:
-            return True
+    if first >= 0 and second >= 0 and _meet(arrays, first, second, surroundings[1]):
+        return True
     for item in range(len(dofs)):
         dof = dofs[item]
         if item in (first, second):
@@ -80,4 +78,17 @@ def _approaches(position: Floats, velocity: Floats, radius: float, surroundings:
     clearance, dt = surroundings
     room, away_x, away_y = clearance_at(position[0], position[1], ClearanceField(*clearance))
     approach = -(velocity[0] * away_x + velocity[1] * away_y)
-    return bool(approach > MAX_APPROACH and room - radius < approach * dt + APPROACH_MARGIN)
+    return bool(approach > MAX_APPROACH and room - radius < approach * dt + MARGIN)
+
+
+@kernel
+def _meet(arrays: Any, first: int, second: int, dt: float) -> bool:
+    """Return True if two objects may hit each other fast within the next control step."""
+    qvel, xpos, _, dofs, bodies, radii = arrays
+    distance = speed = 0.0
+    for axis in range(3):
+        distance += (xpos[bodies[first], axis] - xpos[bodies[second], axis]) ** 2
+        speed += (qvel[dofs[first] + axis] - qvel[dofs[second] + axis]) ** 2
+    speed = math.sqrt(speed)
+    gap = math.sqrt(distance) - radii[first] - radii[second]
+    return bool(speed > MAX_MEETING and gap < speed * dt + MARGIN)

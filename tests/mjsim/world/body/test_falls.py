@@ -70,6 +70,12 @@ def detector_of(world, clearance):
     return FallDetector(world.model, world.data, world.scene.index, clearance, CONTROL_TIMESTEP)
 
 
+def radius_of(world, item):
+    geoms = np.array(world.scene.index.geoms(world.scene.index.names[item]))
+    geoms = geoms[(world.model.geom_contype | world.model.geom_conaffinity)[geoms] > 0]
+    return (np.linalg.norm(world.model.geom_pos[geoms], axis=1) + world.model.geom_rbound[geoms]).max()
+
+
 def wall_at(x):
     """A wall that fills the half space beyond `x` metres."""
     edges = np.linspace(-30.0, 30.0, 601)
@@ -106,19 +112,31 @@ def test_only_loose_objects_fall(two_objects, velocity, loose):
 )
 def test_a_load_that_may_hit_furniture_soon_is_detected(two_objects, velocity, gap, found):
     world, index = two_objects, two_objects.scene.index
-    geoms = index.geoms(index.names[1])
-    radius = (np.linalg.norm(world.model.geom_pos[geoms], axis=1) + world.model.geom_rbound[geoms]).max()
-    detector = detector_of(world, wall_at(world.data.xpos[index.bodies[1], 0] + radius + gap))
+    detector = detector_of(world, wall_at(world.data.xpos[index.bodies[1], 0] + radius_of(world, 1) + gap))
     world.data.qvel[index.dofs[1] : index.dofs[1] + 2] = velocity
     assert detector.detects((1,)) == found
     assert not detector.detects((0,)) and not detector.detects(())
 
 
 @pytest.mark.parametrize(
-    ("velocities", "found"), [((1.5, 1.5), False), ((1.2, -0.1), False), ((1.2, -0.4), True)]
+    ("velocities", "gap", "found"),
+    [
+        ((1.5, 1.5), 0.0, False),
+        ((0.3, 0.0), 0.0, False),
+        ((0.3, -0.2), 0.04, True),
+        ((0.3, -0.2), 0.06, False),  # do not get there in one control step
+        ((1.0, -0.5), 0.08, True),
+    ],
 )
-def test_loads_that_meet_fast_are_detected(two_objects, velocities, found):
-    detector = detector_of(two_objects, wall_at(30.0))
-    two_objects.data.qvel[two_objects.scene.index.dofs] = velocities
-    assert detector.detects((0, 1)) == found
+def test_loads_that_may_meet_soon_are_detected(two_objects, velocities, gap, found):
+    world, index = two_objects, two_objects.scene.index
+    detector = detector_of(world, wall_at(30.0))
+    world.data.qvel[index.dofs] = velocities
+    first, second = index.bodies
+    world.data.xpos[second] = world.data.xpos[first] + (
+        0.0,
+        radius_of(world, 0) + radius_of(world, 1) + gap,
+        0.0,
+    )
+    assert detector.detects((0, 1)) == detector.detects((1, 0)) == found
     assert not detector.detects((0,))
