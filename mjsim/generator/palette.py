@@ -1,7 +1,7 @@
 """Choose the colours of furniture, walls and floors in a home at random."""
 
 import colorsys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -57,9 +57,10 @@ def surfaces(seed: int, plan: HomePlan) -> list[str]:
     hue, planks = _hue(rng), str(rng.choice(["oak_planks", "pine_planks"]))
     tone = _PLANKS[int(rng.integers(len(_PLANKS)))]
     door = _colour(rng, _hue(rng), (0.1, 0.6), (0.2, 0.75))
+    panel = tuple(min(1.0, value * 1.2 + 0.02) for value in door)
     found = [
         f'<material name="entrance" rgba="{rgba(door)}"/>',
-        f'<material name="entrance_panel" rgba="{rgba(_lighter(door))}"/>',
+        f'<material name="entrance_panel" rgba="{rgba(panel)}"/>',
         '<material name="facade" rgba="0.9 0.88 0.84 1"/>',
     ]
     for room in plan.rooms:
@@ -68,7 +69,7 @@ def surfaces(seed: int, plan: HomePlan) -> list[str]:
     return found
 
 
-def rgba(colour: Rgb) -> str:
+def rgba(colour: Sequence[float]) -> str:
     """Format an opaque colour for MJCF."""
     return " ".join(f"{value:.3f}" for value in colour) + " 1"
 
@@ -111,8 +112,3 @@ def _colour(
 ) -> Rgb:
     r, g, b = colorsys.hsv_to_rgb(hue % 1, rng.uniform(*saturation), rng.uniform(*value))
     return float(r), float(g), float(b)
-
-
-def _lighter(colour: Rgb) -> Rgb:
-    r, g, b = (min(1.0, value * 1.2 + 0.02) for value in colour)
-    return r, g, b

@@ -150,9 +150,8 @@ class Space:
         poses = ((k, self._pose(places[k], free)) for k in order)
         for k, place in itertools.islice(((k, at) for k, at in poses if self.is_clear(piece, at)), TRIES):
             own, hit, zones = ([_spot(box) for box in of[k].tolist()] for of in (boxes, hits, uses))
-            used = (
-                [] if piece.kind in UNUSED else [moved(s, place.x, place.y, place.yaw) for s in piece.reached]
-            )
+            reached = () if piece.kind in UNUSED else piece.reached
+            used = [moved(spot, place.x, place.y, place.yaw) for spot in reached]
             if self.connected(hit, zones, used):
                 self.near += used
                 self.stand(piece, place, own, zones, hit)

@@ -120,13 +120,7 @@ class Builder:
         )
 
     def legs(
-        self,
-        material: str,
-        w: float,
-        y: Span,
-        height: float,
-        inset: float = 0.05,
-        radius: float = 0.022,
+        self, material: str, w: float, y: Span, height: float, inset: float, radius: float = 0.022
     ) -> None:
         square = self.chance(0.5)
         for sx in (-1, 1):
@@ -138,16 +132,9 @@ class Builder:
                     self.post(material, u, v, (0, height), radius)
 
     def fronts(
-        self,
-        material: str,
-        w: float,
-        z: Span,
-        y: float,
-        columns: int = 1,
-        rows: int = 1,
-        x: float = 0.0,
+        self, material: str, w: float, z: Span, y: float, columns: int, rows: int = 1, x: float = 0.0,
         doors: bool = False,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Add a grid of drawer fronts or doors with handles. The backs of the fronts are at depth `y`."""
         wide, high = (w - GAP) / columns, (z[1] - z[0] - GAP) / rows
         for i in range(columns):
@@ -199,14 +186,8 @@ class Builder:
 
     def _frame(self, x: float, y: float, z: float) -> None:
         self.box(self.wood, 0.15, (y - 0.01, y + 0.01), (z, z + 0.2), x, seen=True)
-        self.box(
-            self.pick(*self.look.accents, "cream"),
-            0.11,
-            (y + 0.01, y + 0.013),
-            (z + 0.02, z + 0.18),
-            x,
-            seen=True,
-        )
+        picture = self.pick(*self.look.accents, "cream")
+        self.box(picture, 0.11, (y + 0.01, y + 0.013), (z + 0.02, z + 0.18), x, seen=True)
 
     def _vase(self, x: float, y: float, z: float) -> None:
         tall = float(self.rng.uniform(0.07, 0.1))
@@ -227,11 +208,7 @@ class Builder:
     def _bowl(self, x: float, y: float, z: float) -> None:
         self.soft(self.pick("ceramic", *self.look.accents), (x, y, z + 0.035), (0.12, 0.11, 0.035))
         if self.chance(0.6):
-            for u, v, fruit in (
-                (-0.04, 0.01, "accent_a"),
-                (0.04, 0.02, "accent_b"),
-                (0.0, -0.04, "accent_c"),
-            ):
+            for fruit, u, v in (("accent_a", -0.04, 0.01), ("accent_b", 0.04, 0.02), ("accent_c", 0, -0.04)):
                 self.soft(fruit, (x + u, y + v, z + 0.075), (0.035, 0.035, 0.035))
 
     def _box(self, x: float, y: float, z: float) -> None:

@@ -109,10 +109,6 @@ def _angle(spec: mujoco.MjSpec, radians: float) -> float:
     return math.degrees(radians) if spec.compiler.degree else radians
 
 
-def _yaw_quaternion(yaw: float) -> list[float]:
-    return [math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
-
-
 def _set_object_bits(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
     for name in object_names:
         body = spec.body(f"{name}/object")
@@ -143,7 +139,7 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float], radius: fl
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
     base.add_joint(name=PREFIX + "x", type=slide, axis=[1, 0, 0], ref=x)
     base.add_joint(name=PREFIX + "y", type=slide, axis=[0, 1, 0], ref=y)
-    body = base.add_body(name=BODY, quat=_yaw_quaternion(heading))
+    body = base.add_body(name=BODY, quat=[math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)])
     _set_inertia(body, 10.0, (2.0, 2.0, 1.5), (0.0, 0.0, 0.9))
     body.add_joint(name=PREFIX + "yaw", type=hinge, axis=[0, 0, 1], ref=_angle(spec, heading))
     for name, kv, force in (("x", 7000.0, 600.0), ("y", 7000.0, 600.0), ("yaw", 300.0, 150.0)):

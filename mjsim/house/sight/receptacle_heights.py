@@ -93,10 +93,7 @@ def cast_down(
     start, along = np.empty(3), np.empty(3)
     for geom in geoms:
         x, y, dz = positions[geom, 0], positions[geom, 1], top - positions[geom, 2]
-        bound, axes = (
-            shapes.bounds[geom] ** 2,
-            rotations[geom],
-        )  # The columns of a rotation are the axes of the geom.
+        bound, axes = shapes.bounds[geom] ** 2, rotations[geom]  # columns of a rotation are the geom's axes
         size, is_box = shapes.sizes[geom], shapes.types[geom] == _BOX
         along[0], along[1], along[2] = -axes[6], -axes[7], -axes[8]
         for k in range(len(points)):
@@ -193,11 +190,8 @@ def _into_mesh(start: Floats, along: Floats, vertices: Floats, faces: Ints, coun
         a, b, c = vertices[faces[face, 0]], vertices[faces[face, 1]], vertices[faces[face, 2]]
         ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
         vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-        px, py, pz = (
-            along[1] * vz - along[2] * vy,
-            along[2] * vx - along[0] * vz,
-            along[0] * vy - along[1] * vx,
-        )
+        px, py = along[1] * vz - along[2] * vy, along[2] * vx - along[0] * vz
+        pz = along[0] * vy - along[1] * vx
         determinant = ux * px + uy * py + uz * pz
         if abs(determinant) < 1e-15:
             continue

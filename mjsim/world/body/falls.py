@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.compiled.footprint import ClearanceField, clearance_at
-from mjsim.house.scene.scene import SceneIndex
+from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel
 
 MAX_SPEED = 1.0  # downward speed of a part of an object above which the object is falling, in m/s
@@ -29,20 +29,14 @@ Floats = NDArray[np.float64]
 class FallDetector:
     """A detector of falling or tumbling objects, and of carried objects that are about to hit something."""
 
-    def __init__(
-        self,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        index: SceneIndex,
-        clearance: ClearanceField,
-        control_timestep: float,
-    ) -> None:
+    def __init__(self, scene: Scene, data: mujoco.MjData, clearance: ClearanceField, dt: float) -> None:
+        model, index = scene.model, scene.index
         geoms = np.flatnonzero((index.geom_owner >= 0) & ((model.geom_contype | model.geom_conaffinity) > 0))
         radii = np.zeros(len(index.names))  # largest distance of a part from the origin of its body
         extents = np.linalg.norm(model.geom_pos[geoms], axis=1) + model.geom_rbound[geoms]
         np.maximum.at(radii, index.geom_owner[geoms], extents)
         self._arrays = (data.qvel, data.xpos, data.xmat, index.dofs, index.bodies, radii)
-        self._surroundings = (tuple(clearance), control_timestep)
+        self._surroundings = (tuple(clearance), dt)
 
     def detects(self, gripped: tuple[int, ...]) -> bool:
         """Return True if a `gripped` object may soon hit furniture or another one, or a loose object falls fast."""

@@ -55,9 +55,7 @@ class Person:
     def __post_init__(self) -> None:
         self.receptacle_heights = ReceptacleHeights(self.scene)
         self.clearance = carry_clearance(self.scene)
-        self.fall_detector = FallDetector(
-            self.scene.model, self.data, self.scene.index, self.clearance, self.dt
-        )
+        self.fall_detector = FallDetector(self.scene, self.data, self.clearance, self.dt)
         self.posture_pace = posture_pace(self.motion)
 
     @property
@@ -115,9 +113,6 @@ class Person:
     def descent_steps(self, height: float) -> int:
         """Return the number of control steps that a hand needs to lower an object by a height in metres."""
         return self.steps(self.motion.start_time + height / self.motion.descent_speed)
-
-    def carried_bodies(self) -> frozenset[int]:
-        return frozenset(int(self.scene.index.bodies[item]) for item in self.held if item is not None)
 
     def move_hand_to_rest(self, hand: int) -> None:
         """Move the target of an empty hand towards its rest posture for one control step."""

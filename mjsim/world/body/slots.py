@@ -105,7 +105,8 @@ def _height_map(person: Person, item: int, receptacle: ReceptacleGeometry) -> tu
     axes = [np.linspace(-h, h, 1 + 2 * int(np.ceil(h / _MAX_SPACING))) for h in half[:2]]
     local = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     points = receptacle.center[:2] + local @ receptacle.rotation[:2, :2].T
-    ignore = np.array([*person.carried_bodies(), person.scene.index.bodies[item]], np.int32)
+    held = [load for load in person.held if load is not None]
+    ignore = np.asarray(person.scene.index.bodies[[*held, item]], np.int32)
     top = float(receptacle.center[2] + half[2]) + _RAYS_ABOVE
     heights = person.receptacle_heights.heights(person.data, receptacle, points, top, ignore)
     return local, np.asarray(np.maximum(heights - receptacle.center[2], -half[2]))

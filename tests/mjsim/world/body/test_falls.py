@@ -67,7 +67,7 @@ def two_objects(catalogue, navmesh):
 
 
 def detector_of(world, clearance):
-    return FallDetector(world.model, world.data, world.scene.index, clearance, CONTROL_TIMESTEP)
+    return FallDetector(world.scene, world.data, clearance, CONTROL_TIMESTEP)
 
 
 def radius_of(world, item):
