@@ -15,11 +15,11 @@ import msgspec
 from experiments.errors import ConfigError
 from experiments.record.phases import FLYTHROUGH, HUMAN, STORY, TASK, TRAINING
 from experiments.session.familiarise import story_text
-from experiments.trials.design import read_design
+from experiments.trials.design import counted, read_design
 from experiments.trials.exclusions import Exclusions
 from experiments.trials.toml_file import TomlFile
-from experiments.trials.trial_config import SEEDS, TrialConfig
-from experiments.visit.plan import COMPLETION, CONSENT, PHASES, PLAYED, Count, Device, Limits
+from experiments.trials.trial_config import TrialConfig
+from experiments.visit.plan import COMPLETION, COMPREHENSION, CONSENT, PHASES, PLAYED, Count, Device, Limits
 from experiments.visit.texts import Texts, read_texts, story_file
 from mjsim.support.files import read_bytes
 from mjsim.support.urls import parse_url
@@ -140,7 +140,7 @@ class Cell:
 
     @property
     def label(self) -> str:
-        return f"{self.trials[0].assistance}, {self.trials[0].objects} objects"
+        return f"{self.trials[0].assistance}, {counted(self.trials[0].objects, 'object')}"
 
     def trial(self, place: int) -> TrialConfig:
         """Return the trial at an index. Indices beyond the last trial wrap around to the first trial."""
@@ -171,7 +171,8 @@ def read_people_study(path: Path) -> Study:
     Raises:
         ConfigError: The file is missing or invalid. The message names the file, the line and the value.
     """
-    design, file = read_design(path), TomlFile.read(path, "study")
+    of_cells: list[Sequence[TrialConfig]] = []  # trials of each table [[cells]]
+    design, file = read_design(path, of_cells.append), TomlFile.read(path, "study")
     table = file.content.get("study")
     if table is None:
         raise ConfigError(
@@ -185,17 +186,16 @@ def read_people_study(path: Path) -> Study:
         own_texts = path.parent / settings.texts if settings.texts else None
         texts = read_texts(settings.language, own_texts, _values(settings))
         own = design.trials[0].story
-        is_shown = STORY in settings.phases or homes > 1
+        is_shown = homes > 1 or not {STORY, COMPREHENSION}.isdisjoint(settings.phases)
         usual = None if own or not is_shown else story_file(settings.language, several_homes=homes > 1)
     except (msgspec.ValidationError, ConfigError) as error:
         raise file.fault(error, "study", _StudyFile) from error
-    trials = [_of_a_person(trial, settings.phases, usual) for trial in design.trials]
-    if any(trial.trial_number > 1 for trial in trials):
+    if any(trial.trial_number > 1 for trial in design.trials):
         raise ConfigError(
             f"{path}: trials_per_person is for simulated people; a visit of a person has one task"
         )
-    cells = [Cell(tuple(group)) for _, group in itertools.groupby(trials, _of_a_cell)]
-    _check_cells(path, cells)
+    _check_cells(path, of_cells)
+    cells = [Cell([_of_a_person(trial, settings.phases, usual) for trial in trials]) for trials in of_cells]
     story = story_text(usual if own is None else Path(own))
     if homes > 1 and (named := BINS.search(story)):
         told = (
@@ -243,29 +243,26 @@ def _without_film(settings: StudySettings, named: Sequence[str], homes: int) -> 
 def _of_a_person(trial: TrialConfig, phases: Sequence[str], story: Path | None) -> TrialConfig:
     before = [name for name in (STORY, FLYTHROUGH, TRAINING) if name in phases]
     settings: dict[str, Any] = {**trial.settings(), "user": HUMAN, "live": True, "behaviour": {}}
-    if story is not None and trial.story is None and STORY in phases:
+    if STORY not in phases:  # the comprehension check may still show the story
+        settings["story"] = None
+    elif story is not None and trial.story is None:
         settings["story"] = str(story)
     return TrialConfig.of({**settings, "phases": ",".join([*before, TASK])})
 
 
-def _check_cells(path: Path, cells: Sequence[Cell]) -> None:
+def _check_cells(path: Path, of_cells: Sequence[Sequence[TrialConfig]]) -> None:
     """Raise `ConfigError` if a setting that does not belong to a condition differs between cells."""
     for name in ("story", "training_assistance"):
-        if len(values := {getattr(cell.trials[0], name) for cell in cells}) > 1:
+        if len(values := {getattr(trials[0], name) for trials in of_cells}) > 1:
             raise ConfigError(
                 f"{path}: cells differ in {name} ({', '.join(map(str, values))}); it is one for all"
             )
-    for trials in itertools.zip_longest(*(cell.trials for cell in cells)):
+    for trials in itertools.zip_longest(*of_cells):
         if len(houses := {trial.house for trial in trials if trial is not None}) > 1:
             told = (
                 f"cells differ in houses ({', '.join(sorted(houses))}); name the same ones in the same order"
             )
             raise ConfigError(f"{path}: {told}")
-
-
-def _of_a_cell(trial: TrialConfig) -> str:
-    """Return the settings that all trials of a cell share, as a text."""
-    return repr({name: value for name, value in trial.settings().items() if name not in ("house", *SEEDS)})
 
 
 def _values(settings: StudySettings) -> Mapping[str, str]:

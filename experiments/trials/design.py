@@ -45,7 +45,7 @@ class Design:
         if times > 1:
             seeds = ", ".join(f"{name} {getattr(trial, name)}" for name in SEEDS)
             raise ConfigError(
-                f"the design has the same trial {times} times: {trial.objects} objects, {trial.assistance}, "
+                f"the design has the same trial {times} times: {counted(trial.objects, 'object')}, {trial.assistance}, "
                 f"{trial.user}, {seeds}; give each person in a cell a distinct seed"
             )
 

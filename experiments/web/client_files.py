@@ -15,6 +15,7 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 from starlette.templating import Jinja2Templates
 
+from experiments.trials.design import counted
 from hud.texts import filled
 from mjsim.formats.gltf.store import GZIP
 
@@ -118,7 +119,7 @@ def _modules(entry: str) -> tuple[str, ...]:
 
 
 _templates = Jinja2Templates(CLIENT / "templates")
-_templates.env.filters.update(duration=_duration, filled=filled)
+_templates.env.filters.update(counted=counted, duration=_duration, filled=filled)
 _templates.env.globals.update(modules=_modules, static=static_url)
 _templates.env.trim_blocks = True
 _templates.env.auto_reload = False  # template files are not checked for changes on each request

@@ -15,6 +15,7 @@ from experiments.analysis.statistics.anova import EFFECTS, Values, one_way, two_
 from experiments.analysis.statistics.effects import ALPHA, POWER, Interval, people_per_cell
 from experiments.analysis.study.table import StudyTable
 from experiments.errors import ConfigError, StatisticsError
+from experiments.trials.design import counted
 from experiments.trials.exclusions import LeftOut
 
 RESAMPLES = 200  # number of bootstrap resamples for the interval of the sample size
@@ -172,7 +173,8 @@ def _pool(cells: Sequence[Cell], table: StudyTable, wanted: Wanted) -> Pool:
     for (condition, objects), values in pool.items():
         if len(values) < MIN_POOL:
             raise StatisticsError(
-                f"the pool has {len(values)} people with {condition} and {objects} objects; {MIN_POOL} are needed"
+                f"the pool has {len(values)} people with {condition} and {counted(objects, 'object')}; "
+                f"{MIN_POOL} are needed"
             )
     if _variance(pool) <= 0.0:
         raise StatisticsError(f"{wanted.measure} does not vary within any cell of the pool")

@@ -210,7 +210,8 @@ def _of_design(
     for cell in {**sizes[0], **sizes[1]}:
         there, meant = sizes[1][cell], sizes[0][cell]
         if there != meant:
-            yield f"The cell {cell[0]}, {cell[1]} objects has {counted(there, 'trial')}, preregistered {meant}."
+            name = f"{cell[0]}, {counted(cell[1], 'object')}"
+            yield f"The cell {name} has {counted(there, 'trial')}, preregistered {meant}."
     ran = _settings_of_runs(folder)
     if len(ran) != len(people):
         yield "Run directories are missing, so only settings that are columns of the table are compared."
@@ -222,7 +223,7 @@ def _of_design(
 
 def _by_cell(rows: Sequence[Mapping[str, Any]], name: str) -> Counter[str]:
     return Counter(
-        f"{row['assistance']}, {row['objects']} objects: {json.dumps(row[name], sort_keys=True)}"
+        f"{row['assistance']}, {counted(row['objects'], 'object')}: {json.dumps(row[name], sort_keys=True)}"
         for row in rows
     )
 

@@ -13,6 +13,7 @@ from experiments.analysis.report.figures import COLOURS, MAX_DOTS, framed, grid
 from experiments.analysis.statistics.effects import ALPHA, FTest
 from experiments.analysis.statistics.models import residuals_of
 from experiments.analysis.study.analysis import ONE_WAY, TWO_WAY, Analysis, cells_of, tests_of
+from experiments.trials.design import counted
 
 FISHER, WELCH, HC3 = "Fisher; Type II", "Welch; Welch-James", "HC3"
 ANALYSES = {  # names of analyses by type of result, in the order in which they are shown
@@ -83,7 +84,7 @@ def _specifications(analysis: Analysis, name: str) -> dict[str, list[Specificati
     for result in analysis.results:
         if result.measure in readings and result.kind in ANALYSES:
             for effect, test in tests_of(result):
-                where = f"{effect},\n{result.objects or 'all'} objects"
+                where = f"{effect},\n{counted(result.objects, 'object') if result.objects else 'all objects'}"
                 if isinstance(test, FTest):
                     column = analysis.table.sources[result.measure]
                     found.setdefault(where, []).append(Specification(column, ANALYSES[result.kind], test))

@@ -30,6 +30,7 @@ from experiments.record.archive import opened_run, read_file, run_paths
 from experiments.record.files import read_arrays
 from experiments.record.phases import TASK
 from experiments.record.run_directory import TRIALS, is_run
+from experiments.trials.design import counted
 from experiments.trials.floor_plan import PLANNED, WALKED, planned_path
 from mjsim.values.episode import Episode
 
@@ -55,7 +56,7 @@ def by_condition(table: StudyTable, labels: Mapping[str, str]) -> FigureBlock:
             axes.set_ylim(*_limits(table, name))
         panels[0].set_ylabel(labels[name], fontsize=8)
     for axes, objects in zip(figure.axes, levels, strict=False):
-        axes.set_title(f"{objects} objects", fontsize=9)
+        axes.set_title(counted(objects, "object"), fontsize=9)
     caption = "Each dot is a person; black: means with 95 % confidence intervals (Student's t)."
     return framed(figure, "Measures by condition and number of objects", table, caption)
 
@@ -106,7 +107,7 @@ def variances(table: StudyTable, name: str, label: str) -> FigureBlock:
             axes.tick_params(labelsize=7)
         row[0].set_ylabel(f"{condition}\n(people)", fontsize=8)
     for axes, objects in zip(panels[0], levels, strict=True):
-        axes.set_title(f"{objects} objects", fontsize=8)
+        axes.set_title(counted(objects, "object"), fontsize=8)
     figure.supxlabel(label, fontsize=9)
     caption = "Number of people by value, in each cell."
     return framed(figure, f"Distribution of {label.lower()}", table, caption)
@@ -211,8 +212,9 @@ def paths_figure(table: StudyTable, folder: Path) -> FigureBlock:
     figure.axes[0].legend(fontsize=7, loc="lower left")
     mark_origin(figure, table.origin)
     caption = (
-        f"The person with the median distance in each condition, with {table.levels()[0]} objects: the route that was "
-        "planned at the start, and the one that was walked, in the house seen from above; metres walked in the titles."
+        f"The person with the median distance in each condition, with {counted(table.levels()[0], 'object')}: the "
+        "route that was planned at the start, and the one that was walked, in the house seen from above; metres walked "
+        "in the titles."
     )
     return svg(figure, f"Planned and walked paths. {table.origin}.", caption)
 
@@ -261,5 +263,6 @@ def _draw_run(axes: Axes, row: Any, run: Path) -> None:
     axes.plot(*walked[0], "*", color="#009E73", ms=9, label="start")
     axes.set(aspect="equal", xticks=[], yticks=[])
     axes.set_title(
-        f"{row['assistance']}, {row['objects']} objects: {row['task_distance_m']:.0f} m", fontsize=9
+        f"{row['assistance']}, {counted(row['objects'], 'object')}: {row['task_distance_m']:.0f} m",
+        fontsize=9,
     )

@@ -37,6 +37,7 @@ from experiments.analysis.study.measures import LIKERT_PREFIX
 from experiments.analysis.study.robustness import Selection
 from experiments.errors import ExperimentError
 from experiments.record.phases import RECORDED, REHEARSED
+from experiments.trials.design import counted
 from mjsim.values.errors import MjsimError
 
 TITLE = "Study of assistance and difficulty"
@@ -105,7 +106,7 @@ def _people(analysis: Analysis) -> Iterator[Block]:
         yield Paragraph(CAUTION)
     sizes = found.sizes()
     rows = [(condition, *(sizes[condition, n] for n in levels)) for condition in found.conditions()]
-    yield table(("people", *(f"{n} objects" for n in levels)), rows)
+    yield table(("people", *(counted(n, "object") for n in levels)), rows)
     yield from map(Paragraph, found.notes)
     measures = analysis.measures.objective
     yield table(

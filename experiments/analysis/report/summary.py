@@ -7,6 +7,7 @@ import numpy as np
 from experiments.analysis.page import freedom, p_text, shown
 from experiments.analysis.statistics.effects import ALPHA, FTest
 from experiments.analysis.study.analysis import ONE_WAY, TWO_WAY, Analysis, tests_of
+from experiments.trials.design import counted
 
 
 def summary(analysis: Analysis, labels: Mapping[str, str]) -> Iterator[str]:
@@ -17,7 +18,8 @@ def summary(analysis: Analysis, labels: Mapping[str, str]) -> Iterator[str]:
         return
     yield (
         f"Question: do people with {_listed(conditions)} as assistance differ in {_listed(list(labels.values()))}? "
-        f"The table has {len(table.rows)} trials with {_listed([str(n) for n in levels])} objects."
+        f"The table has {len(table.rows)} trials with "
+        f"{_listed([*map(str, levels[:-1]), counted(levels[-1], 'object')])}."
     )
     for name, label in labels.items():
         kind, objects = (TWO_WAY, None) if len(levels) > 1 else (ONE_WAY, levels[0])

@@ -34,7 +34,7 @@ OWN = {
     "phase": "Phase of the study.",
     "order": "Position of the phase in the visit, from 1.",
     "duration_s": "Time from first showing the phase to its end, in seconds; empty if it did not end.",
-    "attempts": "Number of rejected forms in the phase.",
+    "attempts": "Number of attempts at the phase, or 0 if the first form was accepted.",
     "reason": "Reason for the end of the phase.",
     "item": "Name of the item.",
     "answer": "Answer. Scales are numbers from 1. Several choices are joined by semicolons.",

@@ -48,7 +48,7 @@ class Phases(StorePart):
         """Record when a phase was first shown to a participant, and return its row."""
         row = await _phase(connection, person_id, name)
         if row is None:
-            row = PhaseRow(person_id, name, utc_now(), None, None, None, None)
+            row = PhaseRow(person_id, name, utc_now(), None, None, None)
             new = {"person_id": person_id, "name": name, "shown": row.shown}
             await connection.execute(insert(phases), new)
         return row

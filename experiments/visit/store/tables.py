@@ -165,7 +165,6 @@ phase = Table(
     Column("shown", Utc, nullable=False),
     Column("ended", Utc),
     Column("duration_s", Double),
-    Column("attempts", Integer),
     Column("reason", String(NAME)),
     UniqueConstraint("person_id", "name"),
     **OPTIONS,

@@ -83,7 +83,6 @@ class PhaseRow:
     shown: datetime
     ended: datetime | None
     duration_s: float | None
-    attempts: int | None
     reason: str | None
 
 

@@ -11,6 +11,7 @@ from jinja2 import Environment, FileSystemLoader
 
 from experiments.house import House, read_words
 from experiments.record.reader import Record
+from experiments.trials.design import counted
 from experiments.trials.replay.replay import replay
 from experiments.trials.replay.replayer import Replayer
 from experiments.web.client_files import CLIENT, STATIC, modules_of, trial_texts
@@ -125,7 +126,7 @@ def _scene(house: House, models: set[str]) -> dict[str, bytes]:
 
 def _title(record: Record) -> str:
     start = record.start
-    return f"{start['user']}, {start['assistance']}, {len(record.names)} objects, seed {start['house_seed']}"
+    return f"{start['user']}, {start['assistance']}, {counted(len(record.names), 'object')}, seed {start['house_seed']}"
 
 
 def _packed(value: Any) -> str:

@@ -90,7 +90,7 @@ def check_mesh_file(path: Path, suffixes: tuple[str, ...] = OBJECT_SUFFIXES) -> 
     if path.suffix.lower() not in suffixes:
         raise AssetError(f"{path} is not a {', '.join(suffixes[:-1])} or {suffixes[-1]} file; convert it")
     if not path.is_file():
-        raise AssetError(f"there is no file {path}")
+        raise AssetError(f"{path} is not a file; check the path")
     size = path.stat().st_size
     if size == 0:
         raise AssetError(f"{path} is empty; export it again")

@@ -116,7 +116,7 @@ def _refusal(found: Sequence[Finding]) -> str:
 def read_scene(source: Path, options: HouseOptions) -> SourceScene:
     """Read a scene from a file. Raise an AssetError if its type is unknown or the file cannot be read."""
     if not source.is_file():
-        raise AssetError(f"there is no file {source}")
+        raise AssetError(f"{source} is not a file; check the path")
     for endings, read in _READERS:
         if source.name.lower().endswith(endings):
             return read(source, options)

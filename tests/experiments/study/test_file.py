@@ -9,7 +9,7 @@ from starlette.datastructures import ImmutableMultiDict
 from experiments.analysis.study.measures import read_measures
 from experiments.cli.main import main
 from experiments.errors import ConfigError
-from experiments.study.file import PHASES, read_people_study
+from experiments.study.file import PHASES, TEMPLATE, read_people_study
 from experiments.study.plan import plan_of
 from experiments.trials.designs import FOLDER
 from experiments.visit.phases import phases_of
@@ -76,6 +76,17 @@ def test_a_design_alone_is_no_study_with_people(tmp_path):
 def test_cells_share_what_is_one_for_all(tmp_path):
     path = tmp_path / "study.toml"
     path.write_text(PAPER.read_text().replace("[[cells]]\n", '[[cells]]\nhouse = "generated:0"\n', 1))
+    with pytest.raises(ConfigError, match=r"cells differ in houses \(apartment, generated:0"):
+        read_people_study(path)
+    table = '[[cells]]\nassistance = "{}"\nobjects = 6\npeople = 2\nhouse = "{}"\n\n'
+    tables = [
+        table.format(assistance, house)
+        for assistance in ("none", "optimal")
+        for house in ("apartment", "generated:0")
+    ]
+    template = TEMPLATE.read_text()
+    start, end = template.index("[[cells]]"), template.index("# ---- Exclusions")
+    path.write_text(template[:start] + "".join(tables) + template[end:])
     with pytest.raises(ConfigError, match=r"cells differ in houses \(apartment, generated:0"):
         read_people_study(path)
 
@@ -189,6 +200,23 @@ def test_a_study_in_another_language_has_its_story_and_its_messages(tmp_path):
     sent = ImmutableMultiDict({**survey.example(), "age": "7"})
     refused = survey.read(Visitor({}, 0.0, 0, "/"), sent)
     assert "zwischen 18 und 120" in refused.values["form"]["age"].errors[0]
+
+
+@pytest.mark.parametrize("own", [None, "Meine eigene Geschichte."])
+def test_the_comprehension_check_shows_the_story_of_the_language_also_without_a_story_phase(tmp_path, own):
+    path = tmp_path / "study.toml"
+    settings = 'language = "de"\nphases = ["comprehension", "task", "completion"]'
+    text = TEMPLATE.read_text().replace("story = 20\nflythrough = 30", "")
+    text = text.replace('language = "en"', settings)
+    if own is not None:
+        (tmp_path / "story.md").write_text(own)
+        text = text.replace("[all_cells]", '[all_cells]\nstory = "story.md"\nphases = "story,task"')
+    path.write_text(text)
+    study = read_people_study(path)
+    check = next(phase for phase in phases_of(plan_of(study)) if phase.name == "comprehension")
+    shown = "\n".join(check.values(Visitor({}, 0.0, 0, "/"))["story"])
+    assert (own or "Ferienwohnung") in shown
+    assert study.cells[0].trial(0).phase_names == ("task",)
 
 
 def test_a_language_of_ones_own_needs_all_texts_and_a_story(tmp_path):

@@ -1,4 +1,4 @@
-// Offers to continue the visit that was started in this browser.
+// Offers to continue the visit that was started in this browser. The link is then the page's main button.
 
 import "./wait.js";
 
@@ -8,6 +8,9 @@ import { lastVisit } from "./visit.js";
 const link = lastVisit();
 if (link) {
   const offer = byId("continue", HTMLElement);
-  within(offer, "a", HTMLAnchorElement).href = link;
+  const main = within(offer, "a", HTMLAnchorElement);
+  main.href = link;
   offer.hidden = false;
+  document.querySelector("form .button")?.classList.remove("button");
+  main.focus({ preventScroll: true });
 }

@@ -179,12 +179,15 @@ describe("a trial", () => {
     vi.resetModules();
     await import("../static/start.js");
     expect(part("continue").hidden).toBe(false);
-    expect(part("continue").querySelector("a")?.pathname).toBe(location.pathname);
+    const [main, ...others] = document.querySelectorAll("form .button, #continue .button");
+    expect([main, others, document.activeElement]).toEqual([part("continue").querySelector("a"), [], main]);
+    expect(/** @type {HTMLAnchorElement} */ (main).pathname).toBe(location.pathname);
     await import("../static/end.js");
     showPage("welcome");
     vi.resetModules();
     await import("../static/start.js");
     expect(part("continue").hidden).toBe(true);
+    expect(document.querySelectorAll("form .button")).toHaveLength(1);
   });
 
   test("leaves nothing of a person in a browser that people share", async () => {

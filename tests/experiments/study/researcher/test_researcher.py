@@ -60,7 +60,7 @@ def test_who_is_logged_in_sees_the_study_and_who_is_not_sees_the_login(site):
         assert (answer.status_code, answer.headers["location"]) == (303, "/login")
     link = site.begin(site.client())
     text = owner.get("/").text
-    assert "The study is open." in text and "optimal, 1 objects" in text
+    assert "The study is open." in text and "optimal, 1 object<" in text
     assert "p00001" in owner.get("/people").text and "consent" in owner.get("/people/1").text
     for path in ("/people/2", "/people/99999999999999999999", "/people/x", "/nothing"):
         assert owner.get(path).status_code == 404

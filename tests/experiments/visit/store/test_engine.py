@@ -154,6 +154,19 @@ async def test_an_upgrade_that_was_interrupted_goes_on(url):
     await store.close()
 
 
+async def test_a_database_with_a_column_that_is_no_longer_used_keeps_working(url, store, arrive):
+    """The column `phase.attempts` was never written."""
+    await run(store, "ALTER TABLE phase ADD COLUMN attempts INTEGER")
+    person = await arrive(0)
+    again = await Store.open(url, "pilot", "0" * 64)
+    try:
+        await again.show_phase(person.id, "consent")
+        await again.finish_phase(person.id, "consent", "task", {})
+        assert [(row.name, row.ended is not None) for row in await again.phases()] == [("consent", True)]
+    finally:
+        await again.close()
+
+
 def test_a_new_sqlite_file_is_opened_by_several_at_once(tmp_path):
     """SQLite refuses at once, whatever the timeout, if two connections switch a file to WAL mode together."""
 

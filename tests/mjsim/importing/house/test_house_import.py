@@ -450,5 +450,5 @@ def test_a_file_of_another_kind_is_refused_with_the_kinds_that_are_read(tmp_path
 
 @pytest.mark.parametrize("name", ["there_is_none.world", "."])
 def test_a_source_that_is_not_there_is_refused(tmp_path, name):
-    with pytest.raises(AssetError, match="no file"):
+    with pytest.raises(AssetError, match="is not a file; check the path"):
         import_house(tmp_path / Path(name), tmp_path / "out", HouseOptions())
