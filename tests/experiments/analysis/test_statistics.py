@@ -309,6 +309,19 @@ def test_the_mixed_model_by_dense_matrices(spread, with_age):
         assert test.p == pytest.approx(stats.f.sf(statistic, len(rows), df2), rel=1e-6)
 
 
+@given(st.lists(st.floats(0.5, 1.9) | st.floats(2.1, 3.5) | st.floats(3.5, 200.0), min_size=2, max_size=6))
+def test_the_joint_f_test_has_the_mean_of_its_parts(freedom):
+    """By Fai and Cornelius, the mean of F is that of the squared t values, whose mean is df / (df - 2) above 2."""
+    joint, values = variance_components._joint_freedom(np.array(freedom)), [v for v in freedom if v > 2.0]
+    mean = sum(v / (v - 2.0) for v in values) / len(freedom)
+    if max(freedom) - min(freedom) < 1e-6 * max(freedom):
+        assert joint == pytest.approx(freedom[0], rel=1e-5)
+    elif mean > 1.0:
+        assert stats.f.mean(len(freedom), joint) == pytest.approx(mean, rel=1e-6)
+    else:
+        assert joint == 1.0, "too little is known of the variances"
+
+
 def test_the_mixed_model_of_a_published_example():
     """Effort to rise from stools, by four stools and nine people (Pinheiro and Bates 2000, section 1.2)."""
     table = [[12, 15, 12, 10], [10, 14, 13, 12], [7, 14, 13, 9], [7, 11, 10, 9], [8, 11, 8, 7]]

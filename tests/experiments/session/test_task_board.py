@@ -5,8 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from sessions import play
 
-from experiments.session.task_board import PlanView, TaskBoard
+from experiments.session.task_board import READING_TIME, PlanView, TaskBoard
 from hud.messages import message
 from mjsim.values.observation import ObjectStatus, Observation
 from planner.plan import Visit, VisitKind
@@ -146,6 +147,18 @@ def test_a_success_can_be_read_for_two_seconds_before_the_new_plan_is_announced(
     assert text_at(board, start, 16.0) is None
     board.announce_replan(20.0)
     assert text_at(board, start, 20.0) == announced, "the last message was read long ago"
+
+
+@pytest.mark.parametrize("assistance", ["optimal", "highlight"])
+def test_a_session_announces_every_new_plan_and_only_if_its_condition_shows_plans(house, assistance):
+    """The nearest object is often not the planned one."""
+    played, announced = play(house, assistance, user="nearest"), message("replanned", house.texts).text
+    shown = [o.time for o, state in played.shown if state.message and state.message.text == announced]
+    renewed = [event["t"] for event in played.of("plan")][1:] if assistance == "optimal" else []
+    for time in renewed:
+        assert any(time <= at <= time + READING_TIME + 0.1 for at in shown), "after the last message was read"
+    assert all(any(0.0 <= at - time < 10.1 for time in renewed) for at in shown)
+    assert len(renewed) == (5 if assistance == "optimal" else 0)
 
 
 @pytest.mark.parametrize(("refused_at", "again"), [(12.5, True), (13.99, True), (14.0, False), (15.0, False)])

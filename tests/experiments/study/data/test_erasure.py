@@ -17,6 +17,7 @@ from experiments.study.data.retention import forget_old
 from experiments.study.file import read_people_study
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
+from experiments.visit.folders import VisitFolders
 from experiments.visit.store import Store, utc_now
 
 PEOPLE = ("anna", "bert", "cleo")
@@ -109,6 +110,16 @@ def test_who_is_erased_is_nowhere_any_more(served, tmp_path, capsys):
         assert {path for path, _ in traces(tmp_path, others)} >= {"backup.db", "served/study.db"}
     (tmp_path / "again").mkdir()
     assert main(["study", "restore", str(tmp_path / "backup.db"), str(tmp_path / "again" / "study.db")]) == 0
+
+
+def test_nobody_is_erased_whose_runs_cannot_be_deleted(served, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(VisitFolders, "remove", lambda *_: None)
+    assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 2
+    assert f"visits/{'b' * 64} cannot be deleted" in capsys.readouterr().err
+    assert traces(tmp_path / "served", "bert-PID"), "the same command finishes it later"
+    monkeypatch.undo()
+    assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 0
+    assert traces(tmp_path, "bert-PID", "b" * 64) == []
 
 
 def test_nothing_is_said_about_files_that_do_not_contain_the_person(served, tmp_path, capsys):
@@ -266,6 +277,7 @@ def test_the_server_forgets_every_day(served, tmp_path, monkeypatch):
         try:
             await retention.forget_daily(store, tmp_path / "served" / "visits", 30)
         finally:
+            assert traces(tmp_path, "bert-PID", "b" * 64) == [], "while the server keeps the database open"
             await store.close()
 
     with pytest.raises((StopIteration, RuntimeError)):

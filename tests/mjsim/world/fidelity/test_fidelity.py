@@ -21,7 +21,7 @@ from mjsim.values.errors import StateError
 from mjsim.values.observation import ObjectStatus, StepStates
 from mjsim.values.options import FIDELITIES, WorldOptions
 from mjsim.values.person_parameters import PersonParameters
-from mjsim.world.body.rig import X, Y
+from mjsim.world.body.rig import VX, VY, X, Y
 from mjsim.world.fidelity import kinematics
 from mjsim.world.fidelity import trunk_contact as trunk
 from mjsim.world.fidelity.kinematics import Gait
@@ -248,6 +248,23 @@ def test_nobody_walks_into_or_through_a_wall(house, floor, house_footprint, spee
     assert not shapely.LineString(trail).intersects(obstacles)
 
 
+@given(slope=st.floats(0.1, 1.0), speed=st.floats(0.1, 0.9), aside=st.floats(-0.5, 0.5))
+@settings(max_examples=60, deadline=None)
+def test_walls_that_meet_stop_a_person_and_never_push_one(slope, speed, aside):
+    """A person who walks between two converging walls gets stuck, keeps their distance, and gains no speed."""
+    wall = np.array([[0.0, 0.0], [3.0, 3.0 * slope], [3.0, 3.0 * slope + 0.5], [0.0, 0.5]])
+    walls = (wall, np.ascontiguousarray((wall * (1, -1))[::-1]))
+    floor, obstacles = Floor.of_polygons(walls, 0.2), shapely.MultiPolygon(map(shapely.Polygon, walls))
+    body = standing(0.25 * math.hypot(1.0, slope) / slope, 0.0, heading=0.0)
+    for _ in range(200):
+        body[VX], body[VY] = -speed, speed * aside
+        was, before = math.hypot(body[VX], body[VY]), body[[X, Y]]
+        trunk.slide(body, 0.02, 0.2, floor)
+        assert math.hypot(body[VX], body[VY]) <= was + 1e-9
+        assert math.dist(before, body[[X, Y]]) <= 0.02 * was + 1e-9
+        assert obstacles.distance(shapely.Point(body[[X, Y]])) > 0.2 - 1e-6
+
+
 @given(points=st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=1, max_size=30))
 @settings(max_examples=60, deadline=None)
 def test_the_gap_to_an_outline_is_that_of_geometry(points):
@@ -295,6 +312,31 @@ def test_everything_is_delivered_in_as_much_time_as_in_physics(house):
         ends.append(o)
     assert ends[1].time == pytest.approx(ends[0].time, rel=0.01)
     assert np.abs(ends[1].object_positions - ends[0].object_positions).max() < 0.05
+
+
+def hands_while_placing(house, fidelity):
+    """Return both hands in the body frame at every control step of a place that begins with a half turn."""
+    world, rows = world_of(house, fidelity), []
+    for name in ("o0", "o1"):
+        fetch(world, name)
+    walk_to(world, 0.9, 3.0)
+    face(world, 1.5, 2.3)
+    world.step(Place("o0"))
+    while world.busy:
+        o = world.observation()
+        c, s = math.cos(o.heading), math.sin(o.heading)
+        hands = np.array([world.data.site(f"avatar/{hand}_grip").xpos for hand in avatar.HANDS])
+        ahead, left = (hands[:, :2] - o.position).T
+        rows.append([c * ahead + s * left, c * left - s * ahead, hands[:, 2]])
+        world.step(Move())
+    return np.array(rows)
+
+
+def test_both_hands_move_as_in_physics_while_a_person_turns_and_reaches(house):
+    full, event = (hands_while_placing(house, fidelity) for fidelity in FIDELITIES)
+    count = min(len(full), len(event))
+    assert count > 50 and abs(len(full) - len(event)) <= 2
+    assert np.abs(full[:count] - event[:count]).max() < 0.04
 
 
 def test_a_full_receptacle_takes_no_more(cramped_catalogue):
