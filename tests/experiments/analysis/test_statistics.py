@@ -242,6 +242,13 @@ def test_two_answers_make_the_ordinal_model_a_logistic_one():
     assert model.test.statistic == pytest.approx(g.statistic, **EXACT)
 
 
+@pytest.mark.parametrize("other", [[3.0] * 9, [3.0] * 5 + [4.0] * 4])
+def test_odds_that_are_infinite_are_refused(other):
+    """No answer of one group is as high as any answer of the other."""
+    with pytest.raises(StatisticsError, match="a group gives none of the answers of another"):
+        ordinal_model({"none": np.array([1.0] * 6 + [2.0] * 3), "optimal": np.array(other)})
+
+
 def test_welchs_effect_size_lies_in_its_interval():
     """Both are of one noncentrality, however few degrees of freedom few people with a large variance leave."""
     for seed in range(50):

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from sessions import play
 
 from experiments.cli.main import main
 from experiments.record.records import EVENTS, METRICS, EventLog, read_events
@@ -40,6 +41,16 @@ def test_a_run_is_the_same_whether_plans_are_made_in_a_thread_or_inline(house, a
         runs.append((log.events, recorded["log_hash"].tolist(), recorded["state_hash"].tolist()))
     assert runs[0] == runs[1]
     assert sum(event["event"] == "plan" for event in runs[0][0]) > 1, "there was no deviation"
+
+
+def test_the_regret_of_the_suggestion_is_logged_with_that_of_the_visit(house):
+    """Plans of six objects are proven, so that nothing better than a suggestion can be done."""
+    visits = play(house, "optimal", user="nearest", regret=True).of("visit")
+    assert all(visit["suggested_regret_m"] == 0.0 for visit in visits)
+    followed, others = (
+        [v["regret_m"] for v in visits if v["deviated"] is deviated] for deviated in (False, True)
+    )
+    assert max(followed) == 0.0 and min(others) >= 0.0 and max(others) > 1.0
 
 
 def test_a_regret_that_is_not_proven_is_logged_as_bounds(tmp_path, monkeypatch):

@@ -314,6 +314,22 @@ def test_everything_is_delivered_in_as_much_time_as_in_physics(house):
     assert np.abs(ends[1].object_positions - ends[0].object_positions).max() < 0.05
 
 
+def test_the_fall_of_an_object_moves_no_other_that_it_does_not_touch(house):
+    world = world_of(house, "event")
+    for name in ("o0", "o1"):
+        fetch(world, name)
+    walk_to(world, 0.9, 3.0)
+    face(world, 0.3, 3.7)
+    do(world, Place("o0"))  # all other objects come to rest
+    before = world.observation()
+    do(world, Place("o1"))
+    after = world.observation()
+    first, second, ball = (before.object_names.index(name) for name in ("o0", "o1", "o2"))
+    assert after.object_status[first] is after.object_status[second] is ObjectStatus.DELIVERED
+    assert (after.object_positions[ball] == before.object_positions[ball]).all()
+    assert (after.object_quaternions[ball] == before.object_quaternions[ball]).all()
+
+
 def hands_while_placing(house, fidelity):
     """Return both hands in the body frame at every control step of a place that begins with a half turn."""
     world, rows = world_of(house, fidelity), []
