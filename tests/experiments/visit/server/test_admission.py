@@ -129,6 +129,17 @@ def test_where_places_fill_up_people_leave_by_the_platform_and_are_paid_by_rule(
         assert "Enough people" not in client.get("/", params=ids(3)).text, "there is a place again"
 
 
+def test_a_place_that_is_given_back_after_the_last_one_was_taken_is_offered_at_once(tmp_path):
+    """The number of free places is kept for ten seconds only while there are some."""
+    recruitment = f'[study.recruitment]\nplatform = "prolific"\n{CODES}'
+    with served(tmp_path, PHASES + recruitment) as site, site.client() as client:
+        site.ask(site.store.set_quota(0, 2, "test"))
+        first, _ = (site.begin(client, **ids(number)) for number in range(2))
+        leave(client, first)
+        assert "Enough people" not in client.get("/", params=ids(2)).text
+        assert site.begin(client, **ids(2))
+
+
 def test_only_new_people_count_towards_the_limit_of_an_address(tmp_path, monkeypatch):
     monkeypatch.setattr("experiments.visit.server.admission.NEW_PEOPLE", (3, 60.0))
     recruitment = f'[study.recruitment]\nplatform = "prolific"\n{CODES}'
