@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scripted_percepts import Script, place_in, place_near, refusal
 from sessions import prepared
 
 from experiments.errors import ConfigError
@@ -30,8 +31,7 @@ from experiments.participants.guest.perception import Memory, Noticing, Percepti
 from experiments.trials.setup import draw_behaviour
 from experiments.trials.trial_config import TrialConfig
 from hud.markers import BREADCRUMB, FLAGPOLE
-from mjsim.values.actions import IDLE, FollowPath, Move, Pick, Place, Wait
-from mjsim.values.person_parameters import PersonParameters
+from mjsim.values.actions import FollowPath, Move, Pick, Place, Wait
 from planner.plan import Visit, VisitKind
 
 FULL_COMPLIANCE = {"compliance.follows": 1.0, "compliance.quits": 0.0}
@@ -349,51 +349,17 @@ def test_the_person_is_drawn_by_its_seed_and_logged(house):
 # Decisions of a whole guest, from percepts that are written by hand
 
 
-class Script:
-    """A guest in the apartment who sees, remembers and follows everything, unless `parts` says otherwise."""
-
-    def __init__(self, house, targets, position, seed=0, **parts):
-        usual = {
-            "perception": Perception(50.0, 1.0, looks_around=0.0, covers=4.0),
-            "memory": Memory(1.0, 1e6),
-            "decision": ACCURATE,
-            "compliance": Compliance(1.0, 0.0, 0.0, 2.0, quits=0.0),
-            "walking": Walking(0.0, 3.0, 0.0),
-            "timing": Timing(1.0, 0.0, 1e9, 0.0, 0.0, 0.0),
-        }
-        self.guest = Guest(house, np.random.default_rng(seed), Behaviour(**{**usual, **parts}))
-        self.percept = SimpleNamespace(
-            **{"time": 0.0, "position": np.array(position), "heading": 0.0, "pitch": 0.0, "busy": False},
-            **{"carried": (), "targets": targets, "answer": None, "blocked": False, "nearby": {}},
-            **{"person": PersonParameters(), "shown_roles": frozenset(), "guidance": None, "flagpoles": {}},
-        )
-
-    def act(self, seen=(), seconds=1.0, **changes):
-        """Return the action after some seconds. `seen` contains the objects in view and their positions."""
-        now, seen = self.percept, dict(seen)
-        now.answer = None
-        vars(now).update(changes)
-        now.time += seconds
-        now.hands_full, now.look = len(now.carried) >= 2, lambda: seen
-        now.visible_shares = dict.fromkeys(seen, 1.0)
-        return self.guest.act(now)
-
-    def aim(self, *args, **changes):
-        """Return what follows the walk, such as Pick("cup"), or `search`, or `none`."""
-        action = self.act(*args, **changes)
-        if not isinstance(action, FollowPath):
-            return "none" if action == IDLE else action
-        return action.then or "search"
-
-
-def place_in(house, room, number=0):
-    return np.array(house.viewpoints[room][number])
-
-
-def place_near(house, point, distance):
-    """Return a walkable point at a distance from another one, to a few centimetres."""
-    points = house.navmesh.sample(np.random.default_rng(0), 5000)
-    return points[np.abs(np.linalg.norm(points - point, axis=1) - distance).argmin()]
+def guest(house, targets, position, **parts):
+    """A script for a guest who sees, remembers and follows everything, unless `parts` says otherwise."""
+    usual = {
+        "perception": Perception(50.0, 1.0, looks_around=0.0, covers=4.0),
+        "memory": Memory(1.0, 1e6),
+        "decision": ACCURATE,
+        "compliance": Compliance(1.0, 0.0, 0.0, 2.0, quits=0.0),
+        "walking": Walking(0.0, 3.0, 0.0),
+        "timing": Timing(1.0, 0.0, 1e9, 0.0, 0.0, 0.0),
+    }
+    return Script(Guest(house, np.random.default_rng(0), Behaviour(**{**usual, **parts})), targets, position)
 
 
 def suggestion(house, start, kind, name, goal):
@@ -406,7 +372,7 @@ def test_a_slipped_object_is_searched_again_although_it_was_forgotten(house):
     here, there = place_in(house, "living_room"), place_in(house, "living_room", 6)
     forgetful = {"memory": Memory(1.0, 1.0), "decision": dataclasses.replace(ACCURATE, search_cost=100.0)}
     for slips in (False, True):
-        script = Script(house, dict.fromkeys(["cup", "mug"], "dish_bin"), here, **forgetful)
+        script = guest(house, dict.fromkeys(["cup", "mug"], "dish_bin"), here, **forgetful)
         assert script.aim(carried=("mug",)) == Place("mug")
         seen = {"mug": there, "cup": here + 0.5} if slips else {"cup": here + 0.5}
         assert script.aim(seen, carried=()) == Pick("cup")
@@ -422,9 +388,9 @@ def test_an_object_is_given_up_if_a_grip_is_refused_near_its_place_and_it_is_not
 ):
     place = place_in(house, "living_room")
     beside = place_near(house, place, distance)
-    script = Script(house, {"cup": "dish_bin"}, place_in(house, "living_room", 5))
+    script = guest(house, {"cup": "dish_bin"}, place_in(house, "living_room", 5))
     assert script.aim({"cup": place}) == Pick("cup")
-    answer = SimpleNamespace(applied=not refused, object="cup", action=Pick("cup"))
+    answer = refusal("cup") if refused else None
     found = {"cup": place}
     aim = script.aim(
         found if shown == "in view" else (),
@@ -438,7 +404,7 @@ def test_an_object_is_given_up_if_a_grip_is_refused_near_its_place_and_it_is_not
 def test_a_suggestion_that_is_given_up_stays_so_until_another_one_is_shown(house, abandons):
     here, cup, mug = (place_in(house, "living_room", number) for number in (0, 1, 6))
     fickle = Compliance(1.0 - 1e-12, abandons, 0.0, 2.0, quits=0.0)
-    script = Script(house, dict.fromkeys(["cup", "mug"], "dish_bin"), here, compliance=fickle)
+    script = guest(house, dict.fromkeys(["cup", "mug"], "dish_bin"), here, compliance=fickle)
     shown = suggestion(house, here, VisitKind.PICK, "cup", cup)
     script.act({"mug": mug}, guidance=shown, shown_roles=frozenset({BREADCRUMB}))
     walk = script.act({"mug": mug}, seconds=0.1)
@@ -462,7 +428,7 @@ def test_an_object_near_the_way_is_picked_up_by_those_who_are_tempted(
     house, tempted, distance, held, expected
 ):
     here, cup = place_in(house, "living_room"), place_in(house, "living_room", 1)
-    script = Script(
+    script = guest(
         house, dict.fromkeys(["cup", "mug", "duck", "book"], "dish_bin"), here,
         compliance=Compliance(1.0 - 1e-12, 0.0, tempted, 2.0, quits=0.0),
     )  # fmt: skip
@@ -480,7 +446,7 @@ def test_an_object_near_the_way_is_picked_up_by_those_who_are_tempted(
 
 def test_flagpoles_are_looked_for_by_one_turn_before_something_else_is_done(house):
     here = place_in(house, "living_room")
-    script = Script(house, {"cup": "dish_bin"}, here)
+    script = guest(house, {"cup": "dish_bin"}, here)
     headings = [0.0, 2.0, 4.0, 6.0, 6.4]
     turns = [script.act(shown_roles=frozenset({FLAGPOLE}), heading=heading) for heading in headings]
     assert all(isinstance(turn, Move) and turn.turn > 0.0 for turn in turns[:4])
@@ -496,7 +462,7 @@ def test_a_guest_reads_the_list_and_thinks_before_each_walk(house):
         ((FLAGPOLE,), 2.0 * 6 * 4 / 240 * 60, 2.0 * (1.0 + 5.0)),
         ((BREADCRUMB,), 0.0, 2.0 * 3.0),
     ):
-        script = Script(house, targets, here, timing=timing)
+        script = guest(house, targets, here, timing=timing)
         seen, goal = {"object_0": here + 1.0}, here + 1.0
         shown = suggestion(house, here, VisitKind.PICK, "object_0", goal) if BREADCRUMB in roles else None
         values = {"seconds": 0.0, "guidance": shown, "shown_roles": frozenset(roles)}
@@ -510,7 +476,7 @@ def test_a_guest_reads_the_list_and_thinks_before_each_walk(house):
 
 def test_an_unknown_bin_is_found_from_a_viewpoint_of_its_room_or_from_near_by(house):
     ignorant = Memory(0.0, 1e6)
-    script = Script(house, {"cup": "dish_bin"}, place_in(house, "living_room"), memory=ignorant)
+    script = guest(house, {"cup": "dish_bin"}, place_in(house, "living_room"), memory=ignorant)
     walk = script.act(carried=("cup",))
     assert walk.then is None and house.rooms.room_at(walk.goal) == "kitchen"
     turn = script.act(position=walk.goal)
@@ -520,7 +486,7 @@ def test_an_unknown_bin_is_found_from_a_viewpoint_of_its_room_or_from_near_by(ho
     for distance, is_seen in ((1.9, True), (2.1, False)):
         bin_ = house.approaches["bookshelf"]
         near = place_near(house, bin_, distance)
-        script = Script(house, {"cup": "bookshelf"}, near, memory=ignorant)
+        script = guest(house, {"cup": "bookshelf"}, near, memory=ignorant)
         assert (script.aim(carried=("cup",)) == Place("cup")) == is_seen
 
 
@@ -532,7 +498,7 @@ def test_a_path_that_was_left_or_is_blocked_is_no_longer_followed(house):
         (here, True, False),
         (here - np.array([0.0, 0.8]), False, False),
     ):
-        script = Script(house, {"cup": "dish_bin"}, position)
+        script = guest(house, {"cup": "dish_bin"}, position)
         script.act(guidance=shown, shown_roles=frozenset({BREADCRUMB}))
         walk = script.act(seconds=0.1, blocked=blocked)
         assert walk.then == Pick("cup") and walk.shown == follows
@@ -542,12 +508,12 @@ def test_a_path_that_was_left_or_is_blocked_is_no_longer_followed(house):
 def test_a_lapse_leads_elsewhere_first_but_not_from_a_path_that_is_shown(house):
     here, cup = place_in(house, "living_room"), place_in(house, "living_room", 1)
     absent = Walking(1.0, 4.0, 0.0)
-    script = Script(house, {"cup": "dish_bin"}, here, walking=absent)
+    script = guest(house, {"cup": "dish_bin"}, here, walking=absent)
     stray = script.act({"cup": cup})
     assert stray.then is None and math.dist(stray.goal, here) > 0.5
     assert script.act(position=stray.goal + np.array([0.6, 0.0])).goal == pytest.approx(stray.goal)
     assert script.aim(position=stray.goal + np.array([0.4, 0.0])) == Pick("cup")
-    script = Script(house, {"cup": "dish_bin"}, here, walking=absent)
+    script = guest(house, {"cup": "dish_bin"}, here, walking=absent)
     script.act(guidance=suggestion(house, here, VisitKind.PICK, "cup", cup))
     assert script.act(seconds=0.1).shown
 
@@ -555,7 +521,7 @@ def test_a_lapse_leads_elsewhere_first_but_not_from_a_path_that_is_shown(house):
 @pytest.mark.parametrize("looks_around", [0.0, 1.0])
 def test_a_searched_place_is_left_after_a_look_around_if_the_guest_takes_one(house, looks_around):
     curious = Perception(50.0, 1.0, looks_around, covers=0.0)
-    script = Script(house, {"cup": "dish_bin"}, place_in(house, "living_room"), perception=curious)
+    script = guest(house, {"cup": "dish_bin"}, place_in(house, "living_room"), perception=curious)
     first = script.act()
     assert first.then is None
     there = script.act(position=first.goal)

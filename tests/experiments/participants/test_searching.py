@@ -4,9 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from scripted_percepts import Script, place_in, place_near, refusal
 
 from experiments.participants.base import Percept
 from experiments.participants.frontier import Frontier, free_length
+from experiments.participants.nearest import Nearest
+from experiments.participants.searcher import Searcher
+from mjsim.values.actions import WAIT, FollowPath, Move, Pick, Place
 from mjsim.values.observation import Observation
 
 
@@ -67,3 +71,62 @@ def test_a_straight_line_ends_at_the_first_wall():
     assert free_length(walls, np.zeros(2), np.array([4.0, 0.0])) == pytest.approx(1.0)
     assert free_length(walls, np.zeros(2), np.array([0.5, 0.0])) == pytest.approx(0.5)
     assert free_length(walls, np.zeros(2), np.array([0.0, 7.0])) == pytest.approx(7.0)
+
+
+def searcher(house, position, *names):
+    return Script(Searcher(house, np.random.default_rng(0)), dict.fromkeys(names, "dish_bin"), position)
+
+
+@pytest.mark.parametrize("refused", [False, True])
+@pytest.mark.parametrize("distance", [1.0, 1.4])
+@pytest.mark.parametrize("seen", [False, True])
+def test_a_searcher_gives_an_object_up_after_a_refusal_near_its_place_if_it_is_not_seen(
+    house, refused, distance, seen
+):
+    place = place_in(house, "living_room")
+    script = searcher(house, place_in(house, "living_room", 5), "cup")
+    assert script.aim({"cup": place}) == Pick("cup")
+    here, answer = place_near(house, place, distance), refusal("cup") if refused else None
+    aim = script.aim({"cup": place} if seen else (), position=here, answer=answer)
+    assert (aim == Pick("cup")) == (seen or not refused or distance > 1.2)
+
+
+def test_a_searcher_places_objects_when_the_hands_are_full_or_no_other_is_known(house):
+    here, near, far = (place_in(house, "living_room", number) for number in (0, 6, 1))
+    script = searcher(house, here, "cup", "mug", "duck")
+    assert script.aim({"cup": near, "mug": far}) == Pick("cup")
+    assert script.aim({"duck": here}, position=near) == Pick("cup"), "a visit is pursued"
+    assert script.aim(carried=("cup",)) in (Pick("duck"), Pick("mug"))
+    assert script.aim(carried=("cup", "mug")) in (Place("cup"), Place("mug"))
+    assert script.aim(carried=()) == Pick("duck")
+    assert script.aim(carried=("duck",)) == Place("duck")
+    assert isinstance(script.act(carried=(), seconds=0.1), Move), "it looks around for more"
+
+
+def test_a_searcher_turns_around_at_each_place_of_a_room_and_then_goes_to_the_next_room(house):
+    script, rooms = searcher(house, place_in(house, "bedroom"), "cup"), []
+    for _ in range(len(house.viewpoints["bedroom"]) + 1):
+        walk = script.act()
+        place = walk.goal if isinstance(walk, FollowPath) else script.percept.position
+        rooms.append(house.rooms.room_at(place))
+        turns = (
+            script.turn()
+            if not isinstance(walk, FollowPath)
+            else [script.act(position=place), *script.turn()]
+        )
+        assert sum(isinstance(turn, Move) and turn.turn > 0.0 for turn in turns) >= 12
+    assert rooms[:-1] == ["bedroom"] * len(house.viewpoints["bedroom"]) and rooms[-1] != "bedroom"
+
+
+def test_nearest_turns_to_find_flagpoles_and_makes_the_nearest_visit_until_it_is_impossible(house):
+    here, near, far = (place_in(house, "living_room", number) for number in (0, 6, 1))
+    script = Script(Nearest(house), dict.fromkeys(["cup", "mug"], "dish_bin"), here)
+    *turns, after = script.turn()
+    assert all(isinstance(turn, Move) and turn.turn > 0.0 for turn in turns[:-1]) and after == WAIT
+    assert script.aim(flagpoles={"mug": far, "cup": near}) == Pick("cup")
+    assert script.aim(position=far) == Pick("cup"), "a visit is pursued"
+    assert script.aim(answer=refusal("cup"), flagpoles={"mug": far, "cup": near}) == Pick("cup")
+    assert script.aim(answer=refusal("cup"), flagpoles={"mug": far}) == Pick("mug"), "it has gone"
+    assert script.aim(carried=("mug",), flagpoles={}) == Place("mug")
+    assert script.aim(carried=("mug",), flagpoles={"cup": far}) == Place("mug"), "a visit is pursued"
+    assert isinstance(Script(Nearest(house), {"cup": "dish_bin"}, here).act(), Move)
