@@ -157,6 +157,61 @@ def test_the_nearest_object_is_fetched_and_flagpoles_let_walls_be_forgotten(hous
         assert made == Visit(VisitKind.PICK, f"object_{nearest}")
 
 
+def imagined_cost(house, decision, pull, first, position, objects, carried, targets):
+    """Return the cost of a visit and of the nearest visits after it, by names of objects and bins.
+
+    A guest whose hands are full imagines no other picks.
+    """
+
+    def leg(here, visit):
+        there = (
+            objects[visit.object] if visit.kind is VisitKind.PICK else house.approaches[targets[visit.object]]
+        )
+        walk = house.geodesics.shortest_path(here, there).geodesic_distance
+        if visit.kind is VisitKind.PICK:
+            walk = (1 - pull) * walk + pull * math.dist(here, there)
+        is_other_room = house.rooms.room_at(here) != house.rooms.room_at(there)
+        return walk + decision.room_cost * is_other_room, there
+
+    here, held, cost, visit = position, set(carried), 0.0, first
+    loose = set(objects) if len(held) < 2 else set()
+    for _ in range(round(decision.look_ahead)):
+        walk, here = leg(here, visit)
+        cost += walk
+        loose, held = loose - {visit.object}, held ^ {visit.object}
+        left = [Visit(VisitKind.PLACE, name) for name in held]
+        left += [Visit(VisitKind.PICK, name) for name in loose if len(held) < 2]
+        if not left:
+            break
+        visit = min(left, key=lambda one: leg(here, one)[0])
+    return cost
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_the_choice_is_that_of_imagined_nearest_visits(house, seed):
+    rng, names = np.random.default_rng(seed), ["cup", "mug", "duck", "book"]
+    points, targets = (
+        house.navmesh.sample(rng, 5),
+        dict(zip(names, rng.permutation(sorted(house.approaches)).tolist(), strict=False)),
+    )
+    carried = tuple(names[: seed % 3])
+    objects = {name: points[k] for k, name in enumerate(names) if name not in carried}
+    costs = {"look_ahead": 1.0 + seed % 4, "room_cost": float(rng.uniform(0.0, 4.0))}
+    decision, pull = dataclasses.replace(ACCURATE, **costs), float(rng.random())
+    percept = SimpleNamespace(
+        position=points[4], hands_full=len(carried) == 2, carried=carried, targets=targets
+    )
+    made = Chooser(decision, house, Frontier(house, rng), rng).choose(
+        percept, Known(objects, pull, search=False)
+    )
+    visits = [Visit(VisitKind.PLACE, name) for name in carried]
+    visits += [Visit(VisitKind.PICK, name) for name in objects if len(carried) < 2]
+    ranked = [
+        imagined_cost(house, decision, pull, one, points[4], objects, carried, targets) for one in visits
+    ]
+    assert made == visits[int(np.argmin(ranked))]
+
+
 def test_a_costly_search_waits_until_the_hands_are_empty(house):
     position = house.viewpoints["living_room"][0]
     made = [
