@@ -25,7 +25,7 @@ from experiments.participants.guest.decision import (
     choose,
     first_step_costs,
 )
-from experiments.participants.guest.deviations import Adherence, Compliance, Detours, Walking
+from experiments.participants.guest.deviations import MIN_DETOUR, Adherence, Compliance, Detours, Walking
 from experiments.participants.guest.model import Behaviour, Guest
 from experiments.participants.guest.perception import Memory, Noticing, Perception, Recollection
 from experiments.trials.setup import draw_behaviour
@@ -201,15 +201,16 @@ def test_the_choice_is_that_of_imagined_nearest_visits(house, seed):
     percept = SimpleNamespace(
         position=points[4], hands_full=len(carried) == 2, carried=carried, targets=targets
     )
-    made = Chooser(decision, house, Frontier(house, rng), rng).choose(
-        percept, Known(objects, pull, search=False)
-    )
-    visits = [Visit(VisitKind.PLACE, name) for name in carried]
-    visits += [Visit(VisitKind.PICK, name) for name in objects if len(carried) < 2]
+    chooser = Chooser(decision, house, Frontier(house, rng), rng)
+    known = Known(objects, pull, search=False)
+    fetchable = sorted(objects) if len(carried) < 2 else []
+    visits = [Visit(VisitKind.PICK, name) for name in fetchable]
+    visits += [Visit(VisitKind.PLACE, name) for name in carried]
     ranked = [
         imagined_cost(house, decision, pull, one, points[4], objects, carried, targets) for one in visits
     ]
-    assert made == visits[int(np.argmin(ranked))]
+    assert chooser._visit_costs(percept, known, fetchable) == pytest.approx(ranked)
+    assert chooser.choose(percept, known) == visits[int(np.argmin(ranked))]
 
 
 def test_a_costly_search_waits_until_the_hands_are_empty(house):
@@ -255,6 +256,10 @@ def test_without_lapses_and_pull_a_walk_has_no_stops(house):
     pulled = Detours(Walking(0.0, 3.0, 1.0), house, np.random.default_rng(0))
     stops = [stop for a, b in ends for stop in pulled.stops(a, b, pole=True)]
     assert stops and all(np.linalg.norm(stop - house.navmesh.snap(stop)) < 0.01 for stop in stops)
+    for a, b in ends:
+        for stop in pulled.stops(a, b, pole=True):
+            assert math.dist(stop, b) < math.dist(house.navmesh.snap(a), b) - MIN_DETOUR
+            assert house.rooms.room_at(stop) == house.rooms.room_at(a) != house.rooms.room_at(b)
     assert not any(pulled.stops(a, b, pole=False) for a, b in ends)
 
 
@@ -268,6 +273,7 @@ def test_lapses_lead_to_places_of_the_house_that_are_not_too_far(house, lapse_di
         for stop in absent.stops(start, start, pole=False)
     ]
     assert len(walks) >= 55 and max(walks) <= lapse_distance and max(walks) > 0.8 * lapse_distance
+    assert min(walks) > MIN_DETOUR > 0.0
     nowhere = Detours(Walking(1.0, 0.1, 0.0), house, np.random.default_rng(0))
     assert nowhere.stops(starts[0], starts[1], pole=False) == []
 
