@@ -11,10 +11,12 @@ from planning_cases import optimum, random_problem
 
 from planner import regret
 from planner.errors import ProblemError
+from planner.exact.instance import make_instance
+from planner.exact.multipliers import first_bound, grown
 from planner.exact.solver import ExactSolver
-from planner.problem import after, possible_next
+from planner.problem import after, possible_next, tour_length
 from planner.regret import costs_by_pass, regrets
-from planner.solvers import SolveLimit, solver
+from planner.solvers import Deadline, SolveLimit, solver
 
 seeds = st.integers(0, 2**32 - 1)
 TABLE, PASS = ExactSolver(), ExactSolver(table_bytes=0)
@@ -61,6 +63,21 @@ def test_within_the_radius_regrets_are_exact_and_beyond_it_true_lower_bounds(see
         else:
             assert r.regret == pytest.approx(truth, abs=1e-9)
             assert r.regret <= radius + 1e-9
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=seeds, n=st.integers(3, 10), onboard=st.integers(0, 2))
+def test_the_least_cost_of_each_next_visit_is_a_lower_bound(seed, n, onboard):
+    """Also if objects have prices, which are part of the bound."""
+    problem = random_problem(seed, n, onboard)
+    plan, metric, unit = TABLE.solve(problem), problem.integers.metric, problem.integers.unit
+    best = int(tour_length(problem, plan.visits, metric))
+    first = first_bound(make_instance(problem, metric), best)
+    costs = {r.visit: r.cost for r in regrets(problem, TABLE)}
+    for bound in (first, grown(first, best, 1 << 20, Deadline.of(None))):
+        least = regret._least(bound, problem)
+        assert set(least) == set(costs)
+        assert all(bound.root - 1 <= units <= costs[visit] / unit + 1 for visit, units in least.items())
 
 
 def test_beyond_the_table_the_nearest_alternatives_are_exact():
