@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 import pickle
 import shutil
 from pathlib import Path
@@ -15,7 +16,7 @@ from msgspec.structs import replace
 
 from experiments.cli.main import main
 from experiments.errors import ConfigError, ReplayError
-from experiments.participants.distribution import Distribution, Distributions
+from experiments.participants.distribution import Distribution, Distributions, distribution
 from experiments.participants.follower import Follower
 from experiments.record import records
 from experiments.record.reader import read_run
@@ -56,6 +57,27 @@ def test_distributions_are_those_of_statistics(share, first, spread):
         assert Distribution(**{shape: (start, end)}).quantile(share, low, high) == pytest.approx(
             expected, rel=1e-6
         )
+
+
+@given(
+    st.sampled_from(
+        [
+            {"normal": [1.2, 0.2]},
+            {"lognormal": [1.35, 0.35], "min": 0.5},
+            {"uniform": [1.0, 1.2]},
+            {"beta": [0.5, 3.0], "max": 0.9},
+            {"mixture": [[0.62, 1.0], [0.2, {"beta": [2, 2]}], [0.18, {"normal": [1.0, 0.1]}]]},
+        ]
+    ),
+    st.lists(st.floats(0.0, 1.0) | st.sampled_from([0.0, 1.0]), min_size=2, max_size=6),
+)
+def test_every_share_has_a_finite_value_and_higher_shares_have_no_lower_ones(described, shares):
+    spread = distribution("parameter", described)
+    values = [spread.quantile(share) for share in sorted(shares)]
+    assert all(map(math.isfinite, values))
+    if "mixture" not in described:
+        assert values == sorted(values)
+    assert all(spread.min <= value <= spread.max for value in values)
 
 
 @given(st.integers(0, 2**32))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scripted_percepts import Script, place_in, place_near, refusal
 
-from experiments.participants.base import Percept
-from experiments.participants.frontier import Frontier, free_length
+from experiments.participants.base import FAR, Percept, estimated_distances
+from experiments.participants.frontier import SHIFT, Frontier, free_length
 from experiments.participants.nearest import Nearest
 from experiments.participants.searcher import Searcher
 from mjsim.values.actions import WAIT, FollowPath, Move, Pick, Place
@@ -41,6 +41,30 @@ def test_a_full_turn_sees_what_is_near_in_this_room_with_nothing_in_between_and_
             free = free_length(house.navmesh.outline, position, place.point) >= np.linalg.norm(way) - 1e-9
             seen = place.room == room and np.linalg.norm(way) <= 3.0 and free
             assert frontier.is_left(place) == (not seen)
+
+
+def test_places_are_shifted_at_random_to_all_sides(house):
+    around = 0.3 * np.array([[dx, dy] for dx in (-1, 0, 1) for dy in (-1, 0, 1)])
+    middle = next(
+        point
+        for points in house.viewpoints.values()
+        for point in points
+        if all(house.navmesh.is_navigable(point + offset) for offset in around)
+    )
+    shifts = []
+    for seed in range(300):
+        places = [place.point for place in Frontier(house, np.random.default_rng(seed)).places()]
+        shifts.append(min((place - middle for place in places), key=np.linalg.norm))
+    assert np.abs(np.mean(shifts, axis=0)).max() < 0.03
+    assert np.std(shifts, axis=0) == pytest.approx(SHIFT, rel=0.2)
+
+
+def test_an_unreachable_place_is_far_and_all_others_are_as_far_as_they_are(house):
+    start, *goals = house.navmesh.sample(np.random.default_rng(0), 4)
+    outside = np.array([-50.0, -50.0])
+    found = estimated_distances(house, start, [goals[0], outside, *goals[1:]])
+    assert found.pop(1) == FAR
+    assert found == pytest.approx(estimated_distances(house, start, goals)) and max(found) < FAR
 
 
 def test_nobody_sees_what_is_behind(house):

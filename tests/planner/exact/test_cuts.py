@@ -13,9 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ortools.math_opt.python import mathopt
 from planning_cases import Task, expected, grid_problem, random_problem, two_rooms
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import shortest_path
 
 from planner.checker import check, verify_optimal
-from planner.cuts_checker import cuts_bound
+from planner.cuts_checker import _shortest_walks, cuts_bound
 from planner.errors import ProblemError
 from planner.exact.cuts import branch_and_cut
 from planner.exact.cuts.branch_and_cut import tours_by_cuts
@@ -295,3 +297,14 @@ def test_small_problems_do_not_load_the_solvers():
         "sys.exit(sum(name.startswith(('ortools', 'mujoco', 'scipy', 'numba')) for name in sys.modules))\n"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@given(seed=st.integers(0, 2**32 - 1), nodes=st.integers(2, 12))
+def test_the_checker_walks_as_far_as_scipy(seed, nodes):
+    """From the start, which is the node before the last one."""
+    rng = np.random.default_rng(seed)
+    lengths = np.where(rng.random((nodes, nodes)) < 0.4, rng.integers(1, 50, (nodes, nodes)), 0)
+    tail, head = np.nonzero(lengths)
+    found = _shortest_walks(tail, head, lengths[tail, head], nodes).astype(float)
+    truth = shortest_path(csr_array(lengths), indices=nodes - 2)
+    assert np.array_equal(np.where(found > 1e6, np.inf, found), truth)
