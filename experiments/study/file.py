@@ -25,7 +25,6 @@ from mjsim.support.files import read_bytes
 from mjsim.support.urls import parse_url
 
 TEMPLATE = Path(__file__).with_name("template.toml")
-PLATFORMS = ("link", "lab", "prolific", "connect", "external-question")
 
 Money = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]
 Code = Annotated[str, msgspec.Meta(pattern=r"^[0-9A-Za-z_-]{0,64}\Z")]

@@ -95,13 +95,11 @@ class Recollection:
         self.objects: dict[str, Point] = {}
         self.bins = {key for key in sorted(receptacles) if rng.random() < memory.knows_bins}
 
-    def learn(self, found: Mapping[str, Point], time: float) -> list[str]:
-        """Store the positions of objects seen at `time`, in seconds. Return the names of new objects."""
-        new = [name for name in found if name not in self.objects]
+    def learn(self, found: Mapping[str, Point], time: float) -> None:
+        """Store the positions of objects seen at `time`, in seconds."""
         self.objects.update(found)
         for name in found:
             self._until[name] = time + self._memory.retention * float(self._rng.exponential())
-        return new
 
     def forget(self, time: float, but: str | None = None) -> None:
         """Forget the objects whose retention time has passed, except the object `but`."""

@@ -92,7 +92,7 @@ export const over = (reason, saved) => ({
 });
 
 /** @param {string} reason @returns {Dialog} */
-export const cannotDraw = (reason) => ({
+const cannotDraw = (reason) => ({
   title: textOf("cannot_draw"),
   texts: [textOf("cannot_draw_text", { reason })],
   buttons: [[textOf("try_again"), "reload"]],

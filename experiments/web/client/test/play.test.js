@@ -181,6 +181,7 @@ describe("a trial", () => {
     expect(part("continue").hidden).toBe(false);
     const [main, ...others] = document.querySelectorAll("form .button, #continue .button");
     expect([main, others, document.activeElement]).toEqual([part("continue").querySelector("a"), [], main]);
+    expect([...document.querySelectorAll("button, a")].indexOf(/** @type {Element} */ (main))).toBe(0);
     expect(/** @type {HTMLAnchorElement} */ (main).pathname).toBe(location.pathname);
     await import("../static/end.js");
     showPage("welcome");
