@@ -8,7 +8,8 @@ from typing import Any
 
 from experiments.record.events import OUTCOMES, TYPES, OutcomeEvent
 from experiments.record.session_events import LoggedEvent
-from experiments.trials.table import described, trial_columns
+from experiments.trials.attributes import described
+from experiments.trials.table import trial_columns
 
 _HEAD = """\
 # Data dictionary

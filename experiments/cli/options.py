@@ -14,9 +14,10 @@ from experiments.participants.distribution import Distributions
 from experiments.participants.registry import participant_names
 from experiments.session.film_config import FRAME_SIZE, FilmConfig
 from experiments.trials.design import numbers
-from experiments.trials.trial_config import DEFAULTS, SEEDS, SETTINGS, TrialConfig, episode_settings
+from experiments.trials.trial_config import DEFAULTS, DRAWN_BY, SEEDS, SETTINGS, TrialConfig, episode_settings
 from hud.conditions import CONDITIONS, OPTIONS
 from mjsim.render.profiles import FAST, MAX_SIDE, PROFILES
+from mjsim.values.options import CAPACITIES, FIDELITIES
 from mjsim.values.person_parameters import RANGES, PersonParameters
 from planner.solvers import SOLVERS
 
@@ -35,6 +36,14 @@ TRIAL_OPTIONS = tuple(
     if name not in ("objects", "assistance", "user", "live", "behaviour", "trial_number", *PAGE_SETTINGS)
 )
 _TYPES = typing.get_type_hints(TrialConfig)
+_CHOICES: dict[str, tuple[Any, ...]] = {"fidelity": FIDELITIES, "capacity": CAPACITIES, "draw": DRAWN_BY}
+_METAVARS = {  # values that are neither a number N nor a NAME
+    **dict.fromkeys(("time_limit", *SEEDS), "S"),
+    **dict.fromkeys(("episode", "story"), "FILE"),
+    "phases": "NAME,..",
+    "field_of_view_range": "LOW,HIGH",
+    "person": "SPEC",
+}
 
 
 def int_list(text: str) -> list[int]:
@@ -127,8 +136,7 @@ class _CallLimit(argparse.Action):
 
 def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> None:
     """Add an option for a setting of `TrialConfig`. It defaults to None unless `changes` has a default."""
-    extra, option = dict(SETTINGS[name].extra or {}), f"--{name.replace('_', '-')}"
-    text = f"{str(SETTINGS[name].description).replace('`', '').rstrip('.')}{NAMES.get(name, str)()}"
+    text = f"{SETTINGS[name].replace('`', '').rstrip('.')}{NAMES.get(name, str)()}"
     if name in SEEDS:
         text += " (default: the value of --seed)"
     named = isinstance(DEFAULTS[name], str | int) and _TYPES[name] is not bool and "(default" not in text
@@ -137,10 +145,12 @@ def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> N
     arguments: dict[str, Any] = {"help": text[0].lower() + text[1:]}
     if _TYPES[name] is bool:
         arguments["action"] = argparse.BooleanOptionalAction
+    elif name in _CHOICES:
+        arguments |= {"choices": _CHOICES[name], "type": type(_CHOICES[name][0])}
     else:
-        arguments |= {key: extra[key] for key in ("metavar", "choices") if key in extra}
+        arguments["metavar"] = _METAVARS.get(name, "N" if _TYPES[name] is int else "NAME")
         arguments["type"] = {int: int, float | None: seconds}.get(_TYPES[name], str)
-    parser.add_argument(option, **{**arguments, **changes})
+    parser.add_argument(f"--{name.replace('_', '-')}", **{**arguments, **changes})
 
 
 NAMES: dict[str, Callable[[], str]] = {  # functions that list the possible values of a setting in the help

@@ -1,10 +1,6 @@
 """Read and write tables of trials, and describe their columns."""
 
-import dataclasses
-import inspect
 import json
-import re
-import typing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,7 +13,8 @@ from experiments.errors import RecordError
 from experiments.record.columns import HEALTH
 from experiments.record.metrics import COUNTED, Displays, Metrics
 from experiments.record.phases import is_simulated
-from experiments.trials.trial_config import SEEDS, SETTINGS, TrialConfig
+from experiments.trials.attributes import Columns, described
+from experiments.trials.trial_config import SEEDS, TrialConfig
 from mjsim.support.files import check_input, replacing
 from mjsim.values.motion_parameters import GROUPS
 from mjsim.values.person_parameters import PersonParameters
@@ -26,7 +23,6 @@ NAME = "trials"
 _TRIAL = ("user", *SEEDS, "assistance", "objects", "fingerprint")  # columns that identify a trial
 # Metadata key of the column types. They are stored twice because a Parquet footer has no checksum.
 _WRITTEN = b"mjsim.columns"
-Columns = dict[str, tuple[str, str]]  # type and description of each column
 _QUANTITIES = {
     "penetration_m": "penetration depth of objects or the body",
     "trunk_penetration_m": "penetration depth of the trunk and the house",
@@ -40,7 +36,6 @@ _CIRCUMSTANCES = {
     "renderer": ("str", "Renderer of the frames."),
     "wall_s": ("float", "Wall time of the trial, s."),
 }
-_NAMES = {"NoneType": "null", "VisitKind": "str", "Status": "str", "Refusal": "str", "EventKind": "str"}
 
 
 def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path, Path]:
@@ -104,12 +99,7 @@ def _check_columns(schema: pa.Schema) -> None:
 
 def trial_columns() -> Columns:
     """Return the type and the description of each column in a table of trials."""
-    hints = typing.get_type_hints(TrialConfig)
-    found: Columns = {
-        name: (_type_name(hints[name]), str(about.description))
-        for name, about in SETTINGS.items()
-        if name not in ("person", "behaviour")
-    }
+    found = described(TrialConfig, leave_out={"seed", "person", "behaviour"})
     found["fingerprint"] = ("str", "Hash of the settings and of everything else that the trial depends on.")
     found["rooms"] = ("int", "Number of rooms.")
     found["area_m2"] = ("float", "Floor area of the rooms, m2.")
@@ -130,37 +120,3 @@ def trial_columns() -> Columns:
     found["simulated_s"] = ("float", "Simulated time at the last state, s.")
     found["signal, error"] = ("str", "As in the event `end`, if present.")
     return found | _CIRCUMSTANCES
-
-
-def described(kind: type[Any], leave_out: set[str] | frozenset[str] = frozenset()) -> Columns:
-    """Return the type and the description of each field of a class, without inherited fields.
-
-    The docstring of the class must describe all these fields.
-    """
-    texts, hints = _attributes(kind), typing.get_type_hints(kind)
-    names = (
-        [field.name for field in dataclasses.fields(kind)]
-        if dataclasses.is_dataclass(kind)
-        else kind.__annotations__
-    )
-    return {name: (_type_name(hints[name]), texts[name]) for name in names if name not in leave_out}
-
-
-def _attributes(kind: type[Any]) -> dict[str, str]:
-    text = (inspect.getdoc(kind) or "").split("Attributes:\n", 1)[1]
-    text = re.split(r"\n\n?(?=\S)", text)[0]
-    entries = re.split(r"\n(?=    \w+(?:, \w+)*: )", "\n" + text)[1:]
-    pairs = (entry.strip().split(": ", 1) for entry in entries)
-    texts = {name: " ".join(what.split()) for name, what in pairs}
-    return {name: what[0].upper() + what[1:] if what[1:2].isalpha() else what for name, what in texts.items()}
-
-
-def _type_name(hint: Any) -> str:
-    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-    if origin is None:
-        return _NAMES.get(hint.__name__, str(hint.__name__))
-    if origin is typing.Literal:
-        return "str"
-    if origin in (list, dict, tuple):
-        return f"{origin.__name__}[{', '.join(map(_type_name, arguments))}]"
-    return " | ".join(_type_name(argument) for argument in arguments)

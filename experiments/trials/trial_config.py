@@ -1,10 +1,9 @@
 """Settings of a trial, from which command-line options and table columns are derived."""
 
 import math
-import typing
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Any, cast
 
 import msgspec
 
@@ -12,6 +11,7 @@ from experiments.errors import ConfigError
 from experiments.participants.distribution import Distributions
 from experiments.participants.registry import DEFAULT_PARTICIPANT
 from experiments.record.phases import STORY, TASK, TRAINING, phases_of
+from experiments.trials.attributes import attributes
 from experiments.trials.person import check_person, view_limits
 from mjsim.house.catalogue.house_ref import parse_house
 from mjsim.values.episode import CAPACITY, POINTS, Episode
@@ -23,12 +23,6 @@ SEEDS = ("house_seed", "person_seed", "order_seed")
 NO_ASSISTANCE = "none"
 DRAWN_BY = ("auto", "browser", "server")
 MAX_SEED = 2**63 - 1  # largest integer in tables
-
-
-def _about(description: str, **extra: Any) -> msgspec.Meta:
-    return msgspec.Meta(description=description, extra=extra)
-
-
 _AS_SEED = cast(int, None)  # default value, which is replaced by `seed`
 
 
@@ -37,140 +31,67 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     Each of the other three seeds is set to `seed` if it is not given. Afterwards, `seed` is None.
 
+    Attributes:
+        objects: number of misplaced objects, from 1 to the number of points.
+        assistance: assistance condition.
+        user: participant.
+        house: name of a house, path of its folder or catalogue.toml, or a generated home such as `generated:7` or
+            `generated:7?rooms=5` (docs/generated-houses.md).
+        planner: solver of the routing problem.
+        time_limit: simulated time after which the trial ends, in seconds (default: 60, plus 150 per object).
+        live: plan in real time, with proofs in the background, as for a person. The run depends on the machine, but a
+            replay shows the same plans.
+        fidelity: extent of the physics: `full` for everything, `event` only for falling objects (docs/simulation.md).
+        regret: log the regret of every visit: the extra length of the remaining task compared with the best visit.
+            Takes up to 1 s per trial.
+        house_seed: seed of the house: objects, their places, and the start.
+        person_seed: seed of the participant's random choices.
+        order_seed: seed of the order of the task list (PAPER section 5).
+        points: number of candidate places for objects, at least 1 m apart, that are shared by all levels of difficulty
+            (PAPER section 4). Small houses have room for fewer.
+        trial_number: number of the trial among those of the person, from 1 (`trials_per_person` in docs/batches.md).
+        capacity: largest number of objects carried at a time; with 1, only the right hand is used.
+        episode: path of an episode.json to run instead of sampling an episode. Its objects, house and seed apply.
+        phases: phases in order, separated by commas: `story`, `flythrough` and `training` may come before the `task`
+            (docs/trials.md).
+        story: path of a text file to show in the phase `story` instead of the default text.
+        training_assistance: assistance condition of the training, the same for all conditions of the task (PAPER
+            section 7).
+        draw: renderer of a person's view: `browser`, `server`, or `auto` for the browser if it can (docs/browser.md).
+        field_of_view_range: range in radians in which a person may choose the horizontal field of view if the browser
+            draws; without it, the field of view is the person's parameter (docs/browser.md).
+        person: distributions of the person's parameters, drawn by the person's seed (docs/participants.md).
+        behaviour: distributions of the parameters of the participant model (docs/participants.md).
+        seed: value of the seeds that are not given.
+
     Raises:
         ConfigError: A value is invalid.
     """
 
-    objects: Annotated[
-        int, _about("Number of misplaced objects, from 1 to the number of points.", metavar="N")
-    ]
-    assistance: Annotated[str, _about("Assistance condition.", metavar="NAME")]
-    user: Annotated[str, _about("Participant.", metavar="NAME")] = DEFAULT_PARTICIPANT
-    house: Annotated[
-        str,
-        _about(
-            "Name of a house, path of its folder or catalogue.toml, or a generated home such as `generated:7` or "
-            "`generated:7?rooms=5` (docs/generated-houses.md).",
-            metavar="NAME",
-            path=True,
-        ),
-    ] = "apartment"
-    planner: Annotated[str, _about("Solver of the routing problem.", metavar="NAME")] = DEFAULT_SOLVER
-    time_limit: Annotated[
-        float | None,
-        _about(
-            "Simulated time after which the trial ends, in seconds (default: 60, plus 150 per object).",
-            metavar="S",
-        ),
-    ] = None
-    live: Annotated[
-        bool,
-        _about(
-            "Plan in real time, with proofs in the background, as for a person. The run depends on the machine, "
-            "but a replay shows the same plans."
-        ),
-    ] = False
-    fidelity: Annotated[
-        str,
-        _about(
-            "Extent of the physics: `full` for everything, `event` only for falling objects (docs/simulation.md).",
-            choices=FIDELITIES,
-        ),
-    ] = WorldOptions.fidelity
-    regret: Annotated[
-        bool,
-        _about(
-            "Log the regret of every visit: the extra length of the remaining task compared with the best visit. Takes "
-            "up to 1 s per trial."
-        ),
-    ] = True
-    house_seed: Annotated[
-        int, _about("Seed of the house: objects, their places, and the start.", metavar="S")
-    ] = _AS_SEED
-    person_seed: Annotated[int, _about("Seed of the participant's random choices.", metavar="S")] = _AS_SEED
-    order_seed: Annotated[
-        int, _about("Seed of the order of the task list (PAPER section 5).", metavar="S")
-    ] = _AS_SEED
-    points: Annotated[
-        int,
-        _about(
-            "Number of candidate places for objects, at least 1 m apart, that are shared by all levels of difficulty "
-            "(PAPER section 4). Small houses have room for fewer.",
-            metavar="N",
-        ),
-    ] = POINTS
-    trial_number: Annotated[
-        int,
-        _about(
-            "Number of the trial among those of the person, from 1 (`trials_per_person` in docs/batches.md).",
-            metavar="N",
-        ),
-    ] = 1
-    capacity: Annotated[
-        int,
-        _about(
-            "Largest number of objects carried at a time; with 1, only the right hand is used.",
-            choices=CAPACITIES,
-        ),
-    ] = CAPACITY
-    episode: Annotated[
-        str | None,
-        _about(
-            "Path of an episode.json to run instead of sampling an episode. Its objects, house and seed apply.",
-            metavar="FILE",
-            path=True,
-        ),
-    ] = None
-    phases: Annotated[
-        str,
-        _about(
-            "Phases in order, separated by commas: `story`, `flythrough` and `training` may come before the `task` "
-            "(docs/trials.md).",
-            metavar="NAME,..",
-        ),
-    ] = TASK
-    story: Annotated[
-        str | None,
-        _about(
-            "Path of a text file to show in the phase `story` instead of the default text.",
-            metavar="FILE",
-            path=True,
-        ),
-    ] = None
-    training_assistance: Annotated[
-        str,
-        _about(
-            "Assistance condition of the training, the same for all conditions of the task (PAPER section 7).",
-            metavar="NAME",
-        ),
-    ] = NO_ASSISTANCE
-    draw: Annotated[
-        str,
-        _about(
-            "Renderer of a person's view: `browser`, `server`, or `auto` for the browser if it can (docs/browser.md).",
-            choices=DRAWN_BY,
-        ),
-    ] = DRAWN_BY[0]
-    field_of_view_range: Annotated[
-        str | None,
-        _about(
-            "Range in radians in which a person may choose the horizontal field of view if the browser draws; without "
-            "it, the field of view is the person's parameter (docs/browser.md).",
-            metavar="LOW,HIGH",
-        ),
-    ] = None
-    person: Annotated[
-        Distributions,
-        _about(
-            "Distributions of the person's parameters, drawn by the person's seed (docs/participants.md).",
-            metavar="SPEC",
-        ),
-    ] = Distributions()
-    behaviour: Annotated[
-        Distributions,
-        _about("Distributions of the parameters of the participant model (docs/participants.md)."),
-    ] = Distributions()
-    seed: Annotated[int | None, _about("Value of the seeds that are not given.", metavar="S")] = None
+    objects: int
+    assistance: str
+    user: str = DEFAULT_PARTICIPANT
+    house: str = "apartment"
+    planner: str = DEFAULT_SOLVER
+    time_limit: float | None = None
+    live: bool = False
+    fidelity: str = WorldOptions.fidelity
+    regret: bool = True
+    house_seed: int = _AS_SEED
+    person_seed: int = _AS_SEED
+    order_seed: int = _AS_SEED
+    points: int = POINTS
+    trial_number: int = 1
+    capacity: int = CAPACITY
+    episode: str | None = None
+    phases: str = TASK
+    story: str | None = None
+    training_assistance: str = NO_ASSISTANCE
+    draw: str = DRAWN_BY[0]
+    field_of_view_range: str | None = None
+    person: Distributions = Distributions()
+    behaviour: Distributions = Distributions()
+    seed: int | None = None
 
     @classmethod
     def of(cls, settings: Mapping[str, Any]) -> "TrialConfig":
@@ -255,13 +176,9 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 # The description of each recorded setting
-SETTINGS: dict[str, msgspec.Meta] = {
-    name: hint.__metadata__[0]
-    for name, hint in typing.get_type_hints(TrialConfig, include_extras=True).items()
-    if name != "seed"
-}
+SETTINGS = {name: about for name, about in attributes(TrialConfig).items() if name != "seed"}
 DEFAULTS: dict[str, Any] = {f.name: f.default for f in msgspec.structs.fields(TrialConfig)}
-PATHS = tuple(name for name, about in SETTINGS.items() if (about.extra or {}).get("path"))
+PATHS = ("house", "episode", "story")
 # Settings that may accidentally differ between the conditions that are compared
 CONFOUNDERS = tuple(
     name
