@@ -57,8 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.plot is not None and arguments.plot == arguments.csv:
         raise ConfigError(f"--plot and --csv both name {arguments.plot}; give two files")
     for path in (arguments.plot, arguments.csv):
-        if path is not None:
-            check_file(path, replace=arguments.force)
+        check_file(path, replace=arguments.force)
     if arguments.plot is not None:
         require_extra("study")
         if arguments.plot.suffix not in FORMATS:

@@ -5,6 +5,8 @@ import re
 from pathlib import Path
 from typing import Any
 
+from experiments.cli.options import add_command
+
 DESCRIPTION = "Print a script with which a shell completes commands, options, their values and file names."
 
 EPILOG = """\
@@ -16,15 +18,9 @@ examples:
 
 
 def add_parser(commands: Any) -> None:
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "completion",
-        help=None,  # completion scripts omit commands that have no `help` argument
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = add_command(commands, "completion", run, description=DESCRIPTION)
+    parser.epilog = EPILOG
     parser.add_argument("shell", choices=("bash", "zsh"), help="shell that will run the script")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

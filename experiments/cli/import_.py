@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from experiments.cli.options import HelpFormatter, add_setting
+from experiments.cli.options import add_command, add_setting
 from experiments.errors import ConfigError
 from mjsim.formats.scene.source_scene import AXES, UNITS, ImportDecision, ImportOptions
 from mjsim.importing import require_extra
@@ -50,10 +50,9 @@ def add_parser(commands: Any) -> None:
         "import", help=None, description="Import objects, houses and episodes from files of other software."
     )
     kinds = top.add_subparsers(title="what to import", metavar="KIND", required=True)
-    parser = kinds.add_parser(
-        "object", help="import an object from a mesh", description=DESCRIPTION, formatter_class=HelpFormatter
+    parser = add_command(
+        kinds, "object", run, summary="import an object from a mesh", description=DESCRIPTION
     )
-    parser.set_defaults(run=run)
     parser.add_argument("file", type=Path, metavar="FILE", help=".glb, .obj, .stl or .ply")
     add = parser.add_argument
     add("--category", required=True, metavar="NAME", help="category in the house, whose bin takes the object")
@@ -65,14 +64,11 @@ def add_parser(commands: Any) -> None:
         help="house to extend, or its catalogue.toml or folder (default: apartment)",
     )
     add("--force", action="store_true", help="replace an object of the same name")
-    shape = parser.add_argument_group("properties that the file does not define")
-    shape.add_argument(
-        "--units", choices=tuple(UNITS), help="unit (default: m for glTF, else guessed from the size)"
+    shape = _add_shape(
+        parser,
+        units="m for glTF, else guessed from the size",
+        up="y for glTF, else guessed from base and stability",
     )
-    shape.add_argument(
-        "--up", choices=AXES, help="vertical axis (default: y for glTF, else guessed from base and stability)"
-    )
-    shape.add_argument("--scale", type=float, default=1.0, metavar="F", help="factor applied after the unit")
     weight = shape.add_mutually_exclusive_group()
     weight.add_argument("--mass", type=float, metavar="KG", help="mass, 0.03 to 1.5 kg")
     weight.add_argument(
@@ -85,11 +81,16 @@ def add_parser(commands: Any) -> None:
     _add_episodes(kinds)
 
 
+def _add_shape(parser: argparse.ArgumentParser, units: str, up: str) -> Any:
+    group = parser.add_argument_group("properties that the file does not define")
+    group.add_argument("--units", choices=tuple(UNITS), help=f"unit (default: {units})")
+    group.add_argument("--up", choices=AXES, help=f"vertical axis (default: {up})")
+    group.add_argument("--scale", type=float, default=1.0, metavar="F", help="factor applied after the unit")
+    return group
+
+
 def _add_house(kinds: Any) -> None:
-    parser = kinds.add_parser(
-        "house", help="import a house from a scene", description=HOUSE, formatter_class=HelpFormatter
-    )
-    parser.set_defaults(run=run_house)
+    parser = add_command(kinds, "house", run_house, summary="import a house from a scene", description=HOUSE)
     add = parser.add_argument
     add(
         "source",
@@ -115,10 +116,7 @@ def _add_house(kinds: Any) -> None:
         help="folders of models that the scene refers to",
     )
     add("--skip-missing", action="store_true", help="leave out missing files instead of failing")
-    shape = parser.add_argument_group("properties that the file does not define")
-    shape.add_argument("--units", choices=tuple(UNITS), help="unit (default: m; guessed for OBJ)")
-    shape.add_argument("--up", choices=AXES, help="vertical axis (default: y for glTF; guessed for OBJ)")
-    shape.add_argument("--scale", type=float, default=1.0, metavar="F", help="factor applied after the unit")
+    shape = _add_shape(parser, "m; guessed for OBJ", "y for glTF; guessed for OBJ")
     shape.add_argument(
         "--floor",
         type=float,
@@ -177,13 +175,9 @@ def _print(title: str, decisions: Sequence[ImportDecision]) -> None:
 
 
 def _add_episodes(kinds: Any) -> None:
-    parser = kinds.add_parser(
-        "episodes",
-        help="measure the disorder in episodes",
-        description=EPISODES,
-        formatter_class=HelpFormatter,
+    parser = add_command(
+        kinds, "episodes", run_episodes, summary="measure the disorder in episodes", description=EPISODES
     )
-    parser.set_defaults(run=run_episodes)
     add = parser.add_argument
     add("files", type=Path, nargs="+", metavar="FILE", help="RoomR (.pkl.gz) or Housekeep (.json.gz) file")
     add("--out", type=Path, required=True, metavar="DIR", help="output folder, created if missing")

@@ -46,8 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.record.phases import TASK
     from experiments.record.run_directory import TRIALS, check_file, is_batch, is_run, visit_folders
 
-    if arguments.out is not None:
-        check_file(arguments.out, replace=arguments.force)
+    check_file(arguments.out, replace=arguments.force)
     is_one = is_run(arguments.directory) or archive_of(arguments.directory) is not None
     if is_one:
         rows, failures = [_measured(arguments.directory)], 0

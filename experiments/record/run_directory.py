@@ -98,13 +98,15 @@ def check_batch_folder(path: Path) -> None:
     _check_writable(_existing(place / TRIALS))
 
 
-def check_file(path: Path, *, replace: bool = False) -> None:
-    """Check that a file may be written to a path.
+def check_file(path: Path | None, *, replace: bool = False) -> None:
+    """Check that a file may be written to a path, if there is one.
 
     Raises:
         RecordError: `path` exists and cannot be replaced.
         OSError: The folder of the file cannot be written.
     """
+    if path is None:
+        return
     place = _place(path)
     if place.exists() and not place.is_file():
         raise RecordError(f"{path} is not a regular file; name a file that does not exist yet")

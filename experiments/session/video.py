@@ -99,8 +99,10 @@ class VideoWriter:
             container.mux(stream.encode())
 
 
-def check_film(path: Path) -> None:
-    """Raise ConfigError if a file is missing or is not an MP4 video."""
+def check_film(path: Path | None) -> None:
+    """Raise ConfigError if a file is given, but missing or no MP4 video."""
+    if path is None:
+        return
     fault = "is not an MP4 video" if path.is_file() else "does not exist"
     with suppress(OSError, ValueError), path.open("rb") as file, av.open(file) as film:  # or errors of FFmpeg
         fault = "" if "mp4" in film.format.name and film.streams.video else fault

@@ -224,30 +224,13 @@ class Error(WireMessage, frozen=True):
     message: str
 
 
-FromBrowser = (
-    Hello | TakeOver | RunMessage | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave
-)
-ToBrowser = (
-    State
-    | Taken
-    | SceneMessage
-    | Snapshot
-    | Markers
-    | Pictures
-    | Hud
-    | Moment
-    | Busy
-    | Beat
-    | Saved
-    | Queue
-    | Occupied
-    | Replaced
-    | Error
-)
-ToWorker = Open | RunMessage | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave
-FromWorker = (
-    State | Taken | FrameMessage | SceneMessage | Snapshot | Markers | Pictures | Hud | Moment | Busy | Saved
-)
+# Messages that the server forwards
+ToSession = RunMessage | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave
+FromSession = State | Taken | SceneMessage | Snapshot | Markers | Pictures | Hud | Moment | Busy | Saved
+FromBrowser = Hello | TakeOver | ToSession
+ToBrowser = FromSession | Beat | Queue | Occupied | Replaced | Error
+ToWorker = Open | ToSession
+FromWorker = FromSession | FrameMessage
 
 decode_from_browser: Any = msgspec.json.Decoder(FromBrowser).decode
 encode_to_browser = msgspec.json.Encoder().encode

@@ -89,8 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.seed < 0:
         raise ConfigError(f"--seed {arguments.seed} must not be negative")
-    if arguments.out is not None:
-        check_file(arguments.out, replace=arguments.force)
+    check_file(arguments.out, replace=arguments.force)
     if arguments.homes is not None:
         return _homes(arguments)
     wanted = Wanted(
@@ -120,8 +119,7 @@ def _homes(arguments: argparse.Namespace) -> int:
     from experiments.record.files import write_json
     from experiments.record.run_directory import check_file
 
-    if arguments.plot is not None:
-        check_file(arguments.plot, replace=arguments.force)
+    check_file(arguments.plot, replace=arguments.force)
     found = homes_power(
         read_study(arguments.pool, read_measures()),
         arguments.measure,

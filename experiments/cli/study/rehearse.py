@@ -73,8 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.study.rehearsal.report import REPORT
     from experiments.study.rehearsal.run import RehearsalSettings
 
-    if arguments.film is not None:
-        check_film(arguments.film)
+    check_film(arguments.film)
     people = arguments.people or study.people
     settings = RehearsalSettings(
         study.sha256, people, arguments.seed, arguments.per_minute, arguments.dropouts, arguments.factor

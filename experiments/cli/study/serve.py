@@ -115,8 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
         from experiments.study.rehearsal.plan import rehearsed
 
         study = rehearsed(study, arguments.rehearsal)
-    if arguments.film is not None:
-        check_film(arguments.film)
+    check_film(arguments.film)
     check_public_url(arguments.public_url)
     check_public_url(arguments.researcher_url)
     prepare_process()  # must come first so that the folder is created with private permissions

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector, generate_latest
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -33,40 +34,22 @@ class ServerMetrics(Meter):
     def __init__(self) -> None:
         registry = self._registry = CollectorRegistry()
         ProcessCollector(registry=registry)
-        self._people = Gauge("mjsim_people", "Participants by status.", ["status"], registry=registry)
-        self._places = Gauge(
-            "mjsim_places", "Places of cells by state.", ["cell", "state"], registry=registry
+        gauge, counter = partial(Gauge, registry=registry), partial(Counter, registry=registry)
+        histogram = partial(Histogram, buckets=LATENCIES, registry=registry)
+        self._people = gauge("mjsim_people", "Participants by status.", ["status"])
+        self._places = gauge("mjsim_places", "Places of cells by state.", ["cell", "state"])
+        self._sessions = gauge("mjsim_sessions", "Sessions on this server, by phase.", ["phase"])
+        self._capacity = gauge("mjsim_sessions_capacity", "Limit of sessions on this server.")
+        self._held = gauge("mjsim_sessions_held", "Sessions with a slot on this server.")
+        self._waiting = gauge("mjsim_sessions_waiting", "Sessions waiting for a slot on this server.")
+        self._lost = counter("mjsim_workers_lost", "Workers that died during a session.")
+        self._faults = counter("mjsim_log", "Warnings and errors in the log.", ["level"])
+        self._inputs = histogram(
+            "mjsim_input_acknowledged_seconds", "Time from an input until it is on disk."
         )
-        self._sessions = Gauge(
-            "mjsim_sessions", "Sessions on this server, by phase.", ["phase"], registry=registry
-        )
-        self._capacity = Gauge(
-            "mjsim_sessions_capacity", "Limit of sessions on this server.", registry=registry
-        )
-        self._held = Gauge("mjsim_sessions_held", "Sessions with a slot on this server.", registry=registry)
-        self._waiting = Gauge(
-            "mjsim_sessions_waiting", "Sessions waiting for a slot on this server.", registry=registry
-        )
-        self._lost = Counter("mjsim_workers_lost", "Workers that died during a session.", registry=registry)
-        self._faults = Counter("mjsim_log", "Warnings and errors in the log.", ["level"], registry=registry)
-        self._inputs = Histogram(
-            "mjsim_input_acknowledged_seconds",
-            "Time from an input until it is on disk.",
-            buckets=LATENCIES,
-            registry=registry,
-        )
-        self._writes = Histogram(
-            "mjsim_database_write_seconds",
-            "Duration of write transactions.",
-            buckets=LATENCIES,
-            registry=registry,
-        )
-        self._answers = Histogram(
-            "mjsim_http_answer_seconds",
-            "Response time of participants' requests.",
-            ["status"],
-            buckets=LATENCIES,
-            registry=registry,
+        self._writes = histogram("mjsim_database_write_seconds", "Duration of write transactions.")
+        self._answers = histogram(
+            "mjsim_http_answer_seconds", "Response time of participants' requests.", ["status"]
         )
         self.log = FaultLog(self._faults)
 

@@ -120,7 +120,6 @@ class FormPhase:
         return {}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
-        """Validate a submitted form. Return its values, or the reason why the form is refused."""
         form = self._form(sent, visitor.answers)
         if not form.validate():
             return Again(self._plan.texts["common"]["faults"], {"form": form})
@@ -155,7 +154,6 @@ class Story(FormPhase):
     """The page with the background story of the task."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
-        """Return additional values for the page's template."""
         return {"paragraphs": self._plan.story_paragraphs}
 
 
@@ -163,7 +161,6 @@ class ResultPhase(FormPhase):
     """The result page, which shows the metrics of the task and may offer a link to play again."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:
-        """Return additional values for the page's template."""
         return {
             "metrics": visitor.metrics,
             "path": visitor.path,
@@ -176,7 +173,6 @@ class Consent(FormPhase):
     """The consent form, including any additional questions from the study's texts."""
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
-        """Validate a submitted form. Return its values, or the reason why the form is refused."""
         if sent.get("agree") == "no":
             return Done({"agreed": False}, "no_consent")
         if sent.get("agree") != "yes":
@@ -207,7 +203,6 @@ class Comprehension(FormPhase):
     """
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:
-        """Return additional values for the page's template."""
         limit = self._plan.limits.attempts
         left = (
             "" if limit is None else self.texts["attempts"].replace("{left}", str(limit - visitor.attempts))
@@ -215,7 +210,6 @@ class Comprehension(FormPhase):
         return {"story": self._plan.story_paragraphs, "attempt": visitor.attempts, "attempts_left": left}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
-        """Validate a submitted form. Return its values, or the reason why the form is refused."""
         read = super().read(visitor, sent)
         if isinstance(read, Again):
             return dataclasses.replace(read, counts=False)
@@ -235,7 +229,6 @@ class Survey(FormPhase):
     """The survey. A participant who fails too many attention checks is screened out."""
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
-        """Validate a submitted form. Return its values, or the reason why the form is refused."""
         read = super().read(visitor, sent)
         allowed = self._plan.limits.inattentive
         if isinstance(read, Again) or allowed is None:
@@ -282,9 +275,7 @@ class TrialPhase:
         self._plan = plan
 
     def page(self, visitor: Visitor, refused: Again | None = None) -> Page:  # noqa: ARG002 - there is no form
-        """Return the page with the form, filled with refused, drafted or earlier values."""
         return Page("play", {"trial": self.name})
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002 - there is no form
-        """Validate a submitted form. Return its values, or the reason why the form is refused."""
         return Again(self._plan.texts["common"]["too_early"])

@@ -14,11 +14,9 @@ class Film(FormPhase):
     """The page with the film of the house. If the browser cannot play it, the participant may continue without it."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
-        """Return additional values for the page's template."""
         return {"required": self._plan.film_required, "poster": self._plan.poster}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
-        """Validate a submitted form. Return its values, or the reason why the form is refused."""
         read = super().read(visitor, sent)
         if isinstance(read, Again):
             return read
@@ -30,7 +28,6 @@ class Film(FormPhase):
         return Done({**read.answers, **measured})
 
     def example(self) -> dict[str, str]:
-        """Return example form data that answers all required questions."""
         played = {PLAYED_S: "1", FILM_S: "1"} if self._plan.film_required else {}
         return {**super().example(), **played}
 

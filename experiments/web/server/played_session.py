@@ -14,21 +14,6 @@ import msgspec
 from experiments.errors import StoreError
 from experiments.web import protocol
 from experiments.web.controls import Input
-from experiments.web.protocol import (
-    Beat,
-    Display,
-    Draw,
-    Error,
-    Inputs,
-    Leave,
-    Open,
-    Pause,
-    RunMessage,
-    Saved,
-    Seen,
-    Taken,
-    View,
-)
 from experiments.web.server.limit import SessionLimit
 from experiments.web.server.player import LiveTrial, Meter, Player
 from experiments.web.server.pool import WorkerPool, WorkerProcess
@@ -82,12 +67,12 @@ class PlayedSession:
         self.browser: Browser | None = None
         self.heard = time.monotonic()
         self.state = State()
-        self.display: Display | None = None
+        self.display: protocol.Display | None = None
         self.spectators = Spectators()
         self._pool, self._limit = pool, limit
         self._task: asyncio.Task[None] | None = None
         self._worker: WorkerProcess | None = None
-        self._view: View | None = None
+        self._view: protocol.View | None = None
         self._taken = self._step = 0  # numbers of the last input on disk and the next control step
         self._lost = False  # True if a worker died and the browser may not know this yet
         self._came = deque[tuple[int, float]](maxlen=MAX_AHEAD)  # numbers and arrival times of unsaved inputs
@@ -99,7 +84,7 @@ class PlayedSession:
             return None
         return self._worker.processor_time()
 
-    def attach(self, browser: Browser, view: View) -> None:
+    def attach(self, browser: Browser, view: protocol.View) -> None:
         """Connect a browser and disconnect the previous one."""
         if self.browser is not None:
             self.browser.send(protocol.Replaced())
@@ -120,34 +105,34 @@ class PlayedSession:
         self.heard = time.monotonic()
         self._pause("disconnected")
 
-    def take(self, message: Any) -> Error | None:
+    def take(self, message: Any) -> protocol.Error | None:
         """Handle a message from the browser. Return an error if the message is rejected."""
-        by_itself = isinstance(message, Seen | Beat | Display | Draw) or (
-            isinstance(message, Inputs) and not message.inputs
+        by_itself = isinstance(message, protocol.Seen | protocol.Beat | protocol.Display | protocol.Draw) or (
+            isinstance(message, protocol.Inputs) and not message.inputs
         )
         if not by_itself:
             self.heard = time.monotonic()
         match message:
-            case View():
+            case protocol.View():
                 self._view = message
-            case Inputs(inputs) if self.state.phase is LOADING or self._lacks_some_before(inputs):
+            case protocol.Inputs(inputs) if self.state.phase is LOADING or self._lacks_some_before(inputs):
                 return None  # ignored, because the browser will send the inputs again
-            case Inputs(inputs):
+            case protocol.Inputs(inputs):
                 if (error := self._input_error(message)) is not None:
                     return error
                 numbers = [new.number for new in inputs]
                 self.state = msgspec.structs.replace(self.state, input=max(self.state.input, *numbers, 0))
                 if numbers and self.state.phase is RUNNING:
                     self._came.append((numbers[-1], time.monotonic()))
-            case Display():
+            case protocol.Display():
                 self.display = message
-            case RunMessage() | Leave() if self.state.phase is LOADING:
-                return Error("too early", "the session is not ready")
-            case Leave() if (wait := self._leave_at - time.monotonic()) > 0.0:
-                return Error("too early", f"this phase can be ended in {wait:.0f} s")
-            case RunMessage():
+            case protocol.RunMessage() | protocol.Leave() if self.state.phase is LOADING:
+                return protocol.Error("too early", "the session is not ready")
+            case protocol.Leave() if (wait := self._leave_at - time.monotonic()) > 0.0:
+                return protocol.Error("too early", f"this phase can be ended in {wait:.0f} s")
+            case protocol.RunMessage():
                 self._lost, self.state = False, self.state.after(Trigger.RUN)
-            case Pause(reason):
+            case protocol.Pause(reason):
                 self._pause(reason)
                 return None
         self._send(message)
@@ -166,22 +151,26 @@ class PlayedSession:
         """Return True if inputs before these inputs were lost because a worker died."""
         return self._lost and len(inputs) > 0 and inputs[0].number > self.state.input + 1
 
-    def _input_error(self, message: Inputs) -> Error | None:
+    def _input_error(self, message: protocol.Inputs) -> protocol.Error | None:
         numbers = [new.number for new in message.inputs]
         latest = max((new.step or 0 for new in message.inputs), default=0)
         if self.state.phase is READY:
-            return Error("too early", "the clock has not been started")
+            return protocol.Error("too early", "the clock has not been started")
         if numbers != sorted(set(numbers)):
-            return Error("out of order", "numbers of inputs must ascend")
+            return protocol.Error("out of order", "numbers of inputs must ascend")
         if numbers and numbers[-1] > self._taken + MAX_AHEAD:
-            return Error("out of order", f"input {numbers[-1]} comes while {self._taken} was taken last")
+            return protocol.Error(
+                "out of order", f"input {numbers[-1]} comes while {self._taken} was taken last"
+            )
         if (latest := max(latest, message.until or 0)) > self._step + protocol.MAX_STEPS_AHEAD:
-            return Error("out of order", f"control step {latest} comes while {self._step} is the next one")
+            return protocol.Error(
+                "out of order", f"control step {latest} comes while {self._step} is the next one"
+            )
         return None
 
     def _pause(self, reason: protocol.PauseReason) -> None:
         self.state = self.state.after(Trigger.PAUSE, reason)
-        self._send(Pause(reason))
+        self._send(protocol.Pause(reason))
 
     def _send(self, message: WireMessage) -> None:
         if self._worker is not None:
@@ -229,7 +218,7 @@ class PlayedSession:
         crashes, safe = 0, 0
         self._taken = self._step = 0
         self._came.clear()
-        opening = Open(
+        opening = protocol.Open(
             str(trial.journal),
             str(trial.run),
             dict(trial.config),
@@ -255,7 +244,7 @@ class PlayedSession:
                             self._taken = number  # number of the last input in a restored session
                         message = msgspec.structs.replace(message, input=max(number, self.state.input))
                         self.state = message
-                    case Taken(number, step):
+                    case protocol.Taken(number, step):
                         crashes = 0 if step > safe else crashes
                         self._taken, safe, self._step = number, step, max(self._step, step)
                         self._measure(number)
@@ -263,7 +252,7 @@ class PlayedSession:
                         self._scenes[opening.config["house"]] = path
                     case Snapshot(step):
                         self._step = max(self._step, step)
-                    case Saved():
+                    case protocol.Saved():
                         await self.player.over(trial)
                         self.trial = None
                         LOG.info("session %s: %s is over", self.player.key[:12], trial.phase)

@@ -16,20 +16,6 @@ from experiments.record.phases import INTERRUPTED
 from experiments.record.run_directory import is_run
 from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
-from experiments.web.protocol import (
-    Blur,
-    Display,
-    Draw,
-    Inputs,
-    Leave,
-    Open,
-    Pause,
-    RunMessage,
-    Saved,
-    Seen,
-    Taken,
-    View,
-)
 from experiments.web.state import Trigger, WireMessage
 from experiments.web.worker import houses
 from experiments.web.worker.clock import Clock
@@ -52,7 +38,7 @@ class Worker:
     def __init__(self, connection: socket.socket) -> None:
         self._connection = connection
         self._sending = threading.Lock()
-        self._opened: SimpleQueue[tuple[Open, SessionControl]] = SimpleQueue()
+        self._opened: SimpleQueue[tuple[protocol.Open, SessionControl]] = SimpleQueue()
         self._viewer = BrowserViewer(self._send)
         self._control = SessionControl(self._send)
 
@@ -80,31 +66,32 @@ class Worker:
         os._exit(0)
 
     def _take(self, message: WireMessage) -> None:
-        if not isinstance(message, Open | Pause):  # the server itself can also send these messages
+        # The server itself can also send these messages
+        if not isinstance(message, protocol.Open | protocol.Pause):
             self._control.hear()
         match message:
-            case Open():
+            case protocol.Open():
                 self._control = SessionControl(self._send)
                 self._opened.put((message, self._control))
-            case Inputs(inputs, until):
+            case protocol.Inputs(inputs, until):
                 self._control.add(inputs, until)
-            case RunMessage(until):
+            case protocol.RunMessage(until):
                 self._control.apply(Trigger.RUN, until=until)
-            case Pause(reason):
+            case protocol.Pause(reason):
                 self._control.apply(Trigger.PAUSE, reason)
-            case Leave():
+            case protocol.Leave():
                 self._control.apply(Trigger.END, INTERRUPTED)
-            case Blur(away):
+            case protocol.Blur(away):
                 self._control.note("blur", away=away)
-            case Display() | Draw():
+            case protocol.Display() | protocol.Draw():
                 self._control.note(type(message).__name__.lower(), **msgspec.structs.asdict(message))
-            case View():
+            case protocol.View():
                 self._viewer.set_view(message)
                 self._control.ask_to_show()
-            case Seen(frame) if self._viewer.drawer is not None:
+            case protocol.Seen(frame) if self._viewer.drawer is not None:
                 self._viewer.drawer.note_seen(frame)
 
-    def _serve(self, opened: Open, control: SessionControl) -> None:
+    def _serve(self, opened: protocol.Open, control: SessionControl) -> None:
         config = TrialConfig.of(opened.config)
         folder, run, house = Path(opened.folder), Path(opened.run), houses.house(config.house)
         if not is_run(run):
@@ -113,9 +100,11 @@ class Worker:
         save_run(folder, run, shown, floor_plan=opened.floor_plan)
         remove_journal(folder, run)
         control.apply(Trigger.END)
-        self._send(Saved())
+        self._send(protocol.Saved())
 
-    def _play(self, opened: Open, control: SessionControl, config: TrialConfig, house: House) -> None:
+    def _play(
+        self, opened: protocol.Open, control: SessionControl, config: TrialConfig, house: House
+    ) -> None:
         viewer = self._viewer
         with open_journal(Path(opened.folder)) as journal:
             if not (is_over(journal) or is_run(Path(opened.run))):  # another worker may have finished the run
@@ -136,7 +125,7 @@ class Worker:
                     viewer.set_view(None)
                     if live.resumed:
                         reason = "restarted" if opened.restarted else "disconnected"
-                        self._send(Taken(live.input, live.session.record.step))
+                        self._send(protocol.Taken(live.input, live.session.record.step))
                         control.apply(Trigger.RESTORED, reason, last=live.input)
                     else:
                         control.apply(Trigger.OPENED)
@@ -147,5 +136,5 @@ class Worker:
                 live.end(reason)
 
 
-def _texts(opened: Open) -> HudTexts | None:
+def _texts(opened: protocol.Open) -> HudTexts | None:
     return HudTexts(**opened.texts) if opened.texts else None

@@ -43,7 +43,7 @@
 /** @typedef {{ type: "error"; code: "idle" | "malformed" | "out of order" | "too early" | "too much"; message: string }} Error The rejection of a message, with an error code and a reason. */
 /** @typedef {{ type: "frame"; number: number; step: number; input: number; codec: "h264" | "jpeg" | "none"; key: boolean; width: number; height: number; milliseconds: number; data: Uint8Array<ArrayBuffer> }} FrameMessage A rendered frame. Frames are numbered from 1 in each view. */
 /** @typedef {Hello | TakeOver | RunMessage | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave} FromBrowser */
-/** @typedef {State | Taken | SceneMessage | Snapshot | Markers | Pictures | Hud | Moment | Busy | Beat | Saved | Queue | Occupied | Replaced | Error} ToBrowser */
+/** @typedef {State | Taken | SceneMessage | Snapshot | Markers | Pictures | Hud | Moment | Busy | Saved | Beat | Queue | Occupied | Replaced | Error} ToBrowser */
 
 export const FRAME_HEAD_BYTES = 28;
 /** @type {Record<number, Codec>} */
