@@ -2,7 +2,6 @@
 
 import argparse
 import re
-from datetime import timedelta
 from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -136,7 +135,7 @@ async def _send(store: "Store", study: "Study", client: "Payer") -> int:
 
     async for sent in Sender(study.settings.name, store, client).send():
         print(f"{sent.key}  {sent.state}  {sent.text}", flush=True)
-    left = len(await store.ledger.owed(in_doubt_after=timedelta()))
+    left = len(await store.ledger.owed())
     print(f"{left} payments are still owed" if left else "all is paid")
     return int(left > 0)
 

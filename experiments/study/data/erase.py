@@ -2,7 +2,6 @@
 
 import asyncio
 import csv
-import datetime
 import shutil
 from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
@@ -37,7 +36,7 @@ async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
     """
     person = await store.person(person_number(name))
     name = person_name(person)
-    owed = await store.ledger.owed(in_doubt_after=datetime.timedelta())
+    owed = await store.ledger.owed()
     if mine := [payment.key for payment in owed if payment.person_id == person.id]:
         raise StoreError(f"{name} is owed {', '.join(mine)}: pay first, then erase")
     told = await _erase_from_copies(store, folder, person, who)

@@ -44,7 +44,7 @@ async def forget_old(store: Store, visits: Path, keep_days: int, *, dry: bool = 
         dry: True to report the affected participants without deleting anything.
     """
     before = utc_now() - datetime.timedelta(days=keep_days)
-    owed = {p.person_id for p in await store.ledger.owed(in_doubt_after=datetime.timedelta())}
+    owed = {p.person_id for p in await store.ledger.owed()}
     people = [await store.person(number) for number in await store.known(before)]
     paid = [person for person in people if person.id not in owed]
     deleted, kept = ([p for p in paid if p.delete_wanted is wanted] for wanted in (True, False))

@@ -2,7 +2,6 @@
 
 from collections.abc import AsyncIterator, Awaitable
 from dataclasses import dataclass
-from datetime import timedelta
 from typing import Literal, TypeVar
 
 from experiments.study.payments.platform import DeclinedError, Order, Payer, StoppedError, UnsureError
@@ -41,7 +40,7 @@ class Sender:
 
     async def send(self) -> AsyncIterator[Sent]:
         """Send all owed payments, and yield the result of each payment."""
-        for last in await self._ledger.owed(in_doubt_after=timedelta()):
+        for last in await self._ledger.owed():
             done = await self._settle(last) if last.in_doubt else None
             if done is None:
                 attempt = await self._ledger.begin_sending(last.key)

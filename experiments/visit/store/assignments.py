@@ -145,7 +145,6 @@ class Assignments(StorePart):
     async def counts(self) -> Counts:
         mine = person.c.study_id == self._study_id
         by_status = select(person.c.status, func.count()).where(mine).group_by(person.c.status)
-        by_phase = select(person.c.phase, func.count()).where(mine, person.c.status.in_(ACTIVE))
         by_place = (
             select(assignment.c.cell, assignment.c.state, func.count())
             .where(assignment.c.study_id == self._study_id)
@@ -153,11 +152,10 @@ class Assignments(StorePart):
         )
         async with self._database.snapshot() as connection:
             statuses = await _tally(connection, by_status)
-            phases = await _tally(connection, by_phase.group_by(person.c.phase))
             cells: dict[int, dict[str, int]] = {}
             for cell, state, number in await connection.execute(by_place):
                 cells.setdefault(cell, {})[state] = number
-        return Counts(statuses, phases, {cell: CellCount(**states) for cell, states in sorted(cells.items())})
+        return Counts(statuses, {cell: CellCount(**states) for cell, states in sorted(cells.items())})
 
     async def _check_active(self, connection: Connection, person_id: int, now: datetime) -> None:
         mine = {"person": person_id, "study": self._study_id}

@@ -70,8 +70,8 @@ class Ledger(StorePart):
         """Record a new attempt to send a payment. Return its number, or None if the payment must not be sent now.
 
         It must not be sent if it has been paid or the outcome of another attempt is unknown. Send the request
-        to the platform immediately, with a timeout well below ten minutes. After ten minutes, :meth:`owed`
-        returns the payment to other callers, who ask the platform about its key.
+        to the platform immediately, with a timeout well below ten minutes. After ten minutes, other callers ask
+        the platform about its key.
         """
         events = await self._known(connection, key)
         if events[-1].in_doubt or paid(events):
@@ -104,16 +104,14 @@ class Ledger(StorePart):
         await self._add(connection, key, attempt, "failed", note=note, **_same(events[0]))
         return True
 
-    async def owed(self, in_doubt_after: timedelta = IN_DOUBT_AFTER) -> tuple[PaymentEvent, ...]:
-        """Return the last event of each unconfirmed payment, except for those that are currently being sent.
+    async def owed(self) -> tuple[PaymentEvent, ...]:
+        """Return the last event of each unconfirmed payment.
 
-        If the event is `sending`, the payment is in doubt. Ask the platform about the key, and then call
-        :meth:`confirm` or :meth:`fail`.
+        If the event is `sending`, the payment is in doubt. Ask the platform about the key, but not within
+        `IN_DOUBT_AFTER` of the event, and then call :meth:`confirm` or :meth:`fail`.
         """
-        limit = await self.now() - in_doubt_after
         payments = by_key(await self.history()).values()
-        unpaid = [events[-1] for events in payments if not paid(events)]
-        return tuple(last for last in unpaid if not last.in_doubt or last.at <= limit)
+        return tuple(events[-1] for events in payments if not paid(events))
 
     async def now(self) -> datetime:
         """Return the current time of the database's clock, which is also used to timestamp events."""

@@ -11,7 +11,7 @@ from experiments.errors import StoreError
 from experiments.visit.store.part import StorePart, new_id, note, transaction
 from experiments.visit.store.tables import answer, person
 from experiments.visit.store.tables import identity as ids
-from experiments.visit.store.values import PersonRow, Status, utc_now
+from experiments.visit.store.values import PersonRow, utc_now
 
 _FIELDS = (
     person.c.id,
@@ -95,11 +95,11 @@ class People(StorePart):
             )
         return PersonRow(*row)
 
-    async def people(self, status: Status | None = None) -> tuple[PersonRow, ...]:
-        """Return all participants, or those with the given status, in order of arrival."""
-        query = self._select() if status is None else self._select(person.c.status == status)
+    async def people(self) -> tuple[PersonRow, ...]:
+        """Return all participants, in order of arrival."""
+        query = self._select().order_by(person.c.id)
         async with self._database.reading() as connection:
-            return tuple(PersonRow(*row) for row in await connection.execute(query.order_by(person.c.id)))
+            return tuple(PersonRow(*row) for row in await connection.execute(query))
 
     async def identity(self, person_id: int) -> dict[str, str]:
         """Return a participant's platform ids, or an empty dictionary if they have been deleted."""

@@ -188,19 +188,6 @@ class Endings(StorePart):
     """Store methods that end visits."""
 
     @transaction
-    async def finish(self, connection: Connection, person_id: int, status: Status = "finished") -> bool:
-        """Set the final status of an active participant. Return False if the participant was not active.
-
-        The participant's place is kept if the status is `finished`, and released otherwise.
-        """
-        await lock_study(connection, self._study_id)
-        mine = (person.c.id == person_id, person.c.status.in_(ACTIVE))
-        if not (await connection.execute(update(person).where(*mine).values(seen=utc_now()))).rowcount:
-            return False
-        await end(connection, self._study_id, person_id, status)
-        return True
-
-    @transaction
     async def time_out(self, connection: Connection, before: datetime) -> int:
         """Time out all participants who have been inactive since `before`, and return their number."""
         gone = (person.c.study_id == self._study_id, person.c.status.in_(ACTIVE), person.c.seen < before)

@@ -157,10 +157,9 @@ class CellCount:
 
 @dataclass(frozen=True)
 class Counts:
-    """The numbers of participants by status, of active participants by phase, and of places by cell."""
+    """The numbers of participants by status and of places by cell."""
 
     statuses: Mapping[str, int]
-    phases: Mapping[str, int]
     cells: Mapping[int, CellCount]
 
 

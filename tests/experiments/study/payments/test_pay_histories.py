@@ -106,7 +106,7 @@ async def test_only_a_person_who_finished_is_rejected(tmp_path, status):
     try:
         arrived = await store.arrive("link", None, {}, "1" * 64, "task")
         if status:
-            await store.finish(arrived.id, status)
+            await store.finish_phase(arrived.id, arrived.phase, arrived.phase, status=status)
         with pytest.raises(StoreError, match=r"did not finish the study .*nothing to reject"):
             await reject(store, await store.person(arrived.id), "EUR", "too fast")
         assert await store.ledger.history() == ()

@@ -32,12 +32,12 @@ async def fill(store):
         if status == "finished":
             await store.finish_phase(person.id, phase, "completion", {}, status=status)
         elif status:
-            await store.finish(person.id, status)
+            await store.finish_phase(person.id, person.phase, person.phase, status=status)
 
 
 async def end_in(store, phase, status):
     person = await store.arrive("link", None, {}, f"{phase}-{status}".ljust(64), phase)
-    await store.finish(person.id, status)
+    await store.finish_phase(person.id, person.phase, person.phase, status=status)
     return person
 
 

@@ -67,7 +67,7 @@ async def test_full_cells_give_no_place_until_somebody_leaves(store, arrive, ass
     people = [await arrive(number) for number in range(6)]
     given = [await assign(person) for person in people]
     assert given[5] is None
-    await store.finish(people[1].id, "timed_out")
+    await store.finish_phase(people[1].id, people[1].phase, people[1].phase, status="timed_out")
     late = await assign(people[5])
     assert (late.cell, late.place) == (given[1].cell, given[1].place)
     assert (await store.assignment(people[1].id)).state == "released"
@@ -76,7 +76,7 @@ async def test_full_cells_give_no_place_until_somebody_leaves(store, arrive, ass
 async def test_an_abandoned_place_goes_to_the_next_person_and_a_finished_one_does_not(store, arrive, assign):
     people = [await arrive(number) for number in range(7)]
     given = [await assign(person) for person in people[:5]]
-    await store.finish(people[0].id)
+    await store.finish_phase(people[0].id, people[0].phase, people[0].phase, status="finished")
     later = people[0].created + 2 * ABANDONED
     with at(later):
         for person in people[2:5]:
@@ -94,7 +94,7 @@ async def test_who_comes_back_gets_the_same_place_if_it_is_free_else_another(sto
     taken = await assign(second, cells, now=later)
     assert taken.place == given.place
     assert await assign(first, cells, now=later) is None
-    await store.finish(second.id, "withdrawn")
+    await store.finish_phase(second.id, second.phase, second.phase, status="withdrawn")
     again = await assign(first, cells, now=later)
     assert (again.place, again.state, again.order_seed) == (given.place, "held", given.order_seed)
     wider = [CellQuota(1, (1,)), CellQuota(1, (2,))]
@@ -107,8 +107,8 @@ async def test_who_finishes_after_the_place_was_given_away_is_one_more_than_want
     first, second = await arrive(1), await arrive(2)
     await assign(first, cells)
     await assign(second, cells, now=first.created + 2 * ABANDONED)
-    assert await store.finish(first.id)
-    assert await store.finish(second.id)
+    assert await store.finish_phase(first.id, first.phase, first.phase, status="finished")
+    assert await store.finish_phase(second.id, second.phase, second.phase, status="finished")
     assert (await store.counts()).cells == {0: CellCount(finished=1, released=1)}
     assert (await store.counts()).statuses == {"finished": 2}
 
@@ -117,7 +117,7 @@ async def test_who_withdraws_after_finishing_gives_the_place_up_with_the_data_on
     first, second = await arrive(1), await arrive(2)
     for person, delete in ((first, False), (second, True)):
         await assign(person)
-        await store.finish(person.id)
+        await store.finish_phase(person.id, person.phase, person.phase, status="finished")
         await store.withdraw(person.id, delete)
     assert (await store.assignment(first.id)).state == "finished"
     assert (await store.assignment(second.id)).state == "released"
@@ -125,7 +125,7 @@ async def test_who_withdraws_after_finishing_gives_the_place_up_with_the_data_on
 
 async def test_a_participation_that_is_over_gets_no_place(store, arrive, assign):
     person = await arrive()
-    await store.finish(person.id, "screened_out")
+    await store.finish_phase(person.id, person.phase, person.phase, status="screened_out")
     with pytest.raises(StoreError, match="has ended"):
         await assign(person)
 
@@ -144,14 +144,13 @@ async def test_a_quota_can_be_changed_while_the_study_runs(store, arrive, assign
         await store.set_quota(0, -1, "ada")
 
 
-async def test_counts_by_status_phase_and_cell(store, arrive, assign):
+async def test_counts_by_status_and_cell(store, arrive, assign):
     people = [await arrive(number) for number in range(4)]
     for person in people[:3]:
         await assign(person)
     await store.finish_phase(people[0].id, "consent", "story")
-    await store.finish(people[1].id)
+    await store.finish_phase(people[1].id, people[1].phase, people[1].phase, status="finished")
     counts = await store.counts()
     assert counts.statuses == {"arrived": 1, "assigned": 2, "finished": 1}
-    assert counts.phases == {"consent": 2, "story": 1}
     assert sum(cell.held for cell in counts.cells.values()) == 2
     assert sum(cell.finished for cell in counts.cells.values()) == 1

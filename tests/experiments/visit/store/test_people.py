@@ -25,7 +25,7 @@ async def test_the_same_platform_id_is_the_same_person_whatever_the_link(store, 
     again = await arrive(2, key="a" * 64)
     assert (again.id, again.token_hash) == (first.id, first.token_hash)
     assert await store.identity(first.id) == {"participant": "p2"}, "a task was given back and accepted again"
-    await store.finish(first.id)
+    await store.finish_phase(first.id, first.phase, first.phase, status="finished")
     await arrive(3, key="a" * 64)
     assert await store.identity(first.id) == {"participant": "p2"}, "that of the submission is paid"
 
@@ -34,7 +34,7 @@ async def test_those_without_a_sign_of_life_time_out(store, arrive):
     early, late = datetime(2026, 5, 1, 12, tzinfo=UTC), datetime(2026, 5, 1, 13, tzinfo=UTC)
     gone, there, finished = await arrive(1, now=early), await arrive(2, now=late), await arrive(3, now=early)
     with at(early):
-        await store.finish(finished.id)
+        await store.finish_phase(finished.id, finished.phase, finished.phase, status="finished")
     assert await store.time_out(late) == 1
     assert await store.time_out(late) == 0
     statuses = [(await store.person(person.id)).status for person in (gone, there, finished)]
@@ -71,9 +71,11 @@ async def test_an_unknown_person_is_an_error_that_names_the_number(store):
         await store.person(7)
 
 
-async def test_people_of_a_status(store, arrive):
+async def test_a_visit_ends_once(store, arrive):
     first, second = await arrive(1), await arrive(2)
-    assert await store.finish(second.id, "no_consent")
-    assert not await store.finish(second.id)
-    assert [person.id for person in await store.people("arrived")] == [first.id]
-    assert [person.id for person in await store.people("no_consent")] == [second.id]
+    assert await store.finish_phase(second.id, second.phase, second.phase, status="no_consent")
+    assert not await store.finish_phase(second.id, second.phase, second.phase, status="finished")
+    assert {person.id: person.status for person in await store.people()} == {
+        first.id: "arrived",
+        second.id: "no_consent",
+    }
