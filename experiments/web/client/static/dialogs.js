@@ -15,19 +15,18 @@ import { textOf } from "./texts.js";
  */
 
 /**
- * A dialog of a title, a text and at most one button.
- * @param {string} title @param {string} content @param {string} [label] of the button @param {string} [action]
+ * A dialog of a title, a text and buttons.
+ * @param {string} title
+ * @param {string} content
+ * @param {[string, string][]} [buttons] names of the labels' texts, and actions
+ * @param {Record<string, string | number>} [values] in the text
  * @returns {Dialog}
  */
-const dialog = (title, content, label, action) => ({
+const dialog = (title, content, buttons = [], values = {}) => ({
   title: textOf(title),
-  texts: [textOf(content)],
-  buttons: label && action ? [[textOf(label), action]] : [],
+  texts: [textOf(content, values)],
+  buttons: buttons.map(([label, action]) => [textOf(label), action]),
 });
-
-/** @param {boolean} interrupted @param {boolean} [late] true if the page has been loading for long */
-export const loading = (interrupted, late) =>
-  late ? dialog("one_moment", "loading_late", "try_again", "reload") : dialog("one_moment", interrupted ? "restoring" : "loading");
 
 /** Roles of markers that the instructions explain. The rims of breadcrumbs belong to these. */
 const EXPLAINED = ["breadcrumb", "flagpole", "goal"];
@@ -67,37 +66,6 @@ const keysOf = (key) => [
   [[key("help")], textOf("keys_help")],
 ];
 
-/** @param {string} reason */
-export const paused = (reason) => dialog("paused", `paused_${reason.replace(" ", "_")}`, "next", "run");
-
-/** @param {number} left s until it may be ended @returns {Dialog} */
-export const ending = (left) =>
-  left > 0
-    ? {
-        title: textOf("end_later"),
-        texts: [textOf("end_later_text", { seconds: left })],
-        buttons: [[textOf("next"), "hide"]],
-      }
-    : {
-        title: textOf("end_now"),
-        texts: [textOf("end_now_text")],
-        buttons: [[textOf("next"), "hide"], [textOf("end_part"), "leave"]],
-      };
-
-/** @param {string} reason @param {boolean} saved @returns {Dialog} */
-export const over = (reason, saved) => ({
-  title: textOf(reason === "all delivered" ? "all_done" : "part_over"),
-  texts: [textOf("next_page")],
-  buttons: saved ? [[textOf("next"), "reload"]] : [],
-});
-
-/** @param {string} reason @returns {Dialog} */
-const cannotDraw = (reason) => ({
-  title: textOf("cannot_draw"),
-  texts: [textOf("cannot_draw_text", { reason })],
-  buttons: [[textOf("try_again"), "reload"]],
-});
-
 /**
  * Returns the dialog of a page that shows neither the task nor its help or instructions.
  * @param {Exclude<Shown, "task" | "help" | "instructions">} shown
@@ -109,15 +77,17 @@ const cannotDraw = (reason) => ({
 export function dialogOf(shown, { wanted, reason, saved }, left, fault, late) {
   switch (shown) {
     case "loading":
-      return loading(wanted, late);
+      if (late) return dialog("one_moment", "loading_late", [["try_again", "reload"]]);
+      return dialog("one_moment", wanted ? "restoring" : "loading");
     case "ending":
-      return ending(left);
+      if (left > 0) return dialog("end_later", "end_later_text", [["next", "hide"]], { seconds: left });
+      return dialog("end_now", "end_now_text", [["next", "hide"], ["end_part", "leave"]]);
     case "paused":
-      return paused(reason);
+      return dialog("paused", `paused_${reason.replace(" ", "_")}`, [["next", "run"]]);
     case "over":
-      return over(reason, saved);
+      return dialog(reason === "all delivered" ? "all_done" : "part_over", "next_page", saved ? [["next", "reload"]] : []);
     case "undrawable":
-      return cannotDraw(fault);
+      return dialog("cannot_draw", "cannot_draw_text", [["try_again", "reload"]], { reason: fault });
     default:
       return dialog(...OTHERS[shown]);
   }
@@ -125,11 +95,11 @@ export function dialogOf(shown, { wanted, reason, saved }, left, fault, late) {
 
 /** @type {Record<"occupied" | "replaced" | "redrawing" | "offline" | "closed" | "idle" | "failed", Parameters<typeof dialog>>} */
 const OTHERS = {
-  occupied: ["occupied", "occupied_text", "continue_here", "takeover"],
-  replaced: ["replaced", "replaced_text", "continue_here", "reload"],
+  occupied: ["occupied", "occupied_text", [["continue_here", "takeover"]]],
+  replaced: ["replaced", "replaced_text", [["continue_here", "reload"]]],
   redrawing: ["one_moment", "redrawing_text"],
   offline: ["offline", "offline_text"],
-  closed: ["closed", "session_kept", "reconnect", "reload"],
-  idle: ["idle", "session_kept", "next", "reload"],
-  failed: ["failed", "failed_text", "try_again", "reload"],
+  closed: ["closed", "session_kept", [["reconnect", "reload"]]],
+  idle: ["idle", "session_kept", [["next", "reload"]]],
+  failed: ["failed", "failed_text", [["try_again", "reload"]]],
 };

@@ -5,11 +5,16 @@ import * as dialogs from "../static/dialogs.js";
 import { Panel } from "../static/panel.js";
 import { giveTexts } from "./page.js";
 
+/** @import { PageState } from "../static/page_state.js" */
+
 beforeEach(giveTexts);
+
+/** @param {Parameters<typeof dialogs.dialogOf>[0]} shown @param {object} [state] of the page @param {number} [left] s */
+const of = (shown, state = {}, left = 0) => dialogs.dialogOf(shown, /** @type {PageState} */ (state), left, "", false);
 
 describe("dialogs", () => {
   test.each(["asked", "hidden", "disconnected", "silent", "restarted", "taken over"])("say why a session is paused: %s", (reason) => {
-    expect(dialogs.paused(reason)).toMatchObject({ title: "Paused", texts: [expect.stringMatching(/\.$/)] });
+    expect(of("paused", { reason })).toMatchObject({ title: "Paused", texts: [expect.stringMatching(/\.$/)] });
   });
 
   test("count objects", () => {
@@ -18,8 +23,8 @@ describe("dialogs", () => {
   });
 
   test("congratulate on nothing but the whole task", () => {
-    expect(dialogs.over("all delivered", false).title).toBe("All done");
-    for (const reason of ["interrupted", "time limit"]) expect(dialogs.over(reason, true).title).not.toContain("one");
+    expect(of("over", { reason: "all delivered" }).title).toBe("All done");
+    for (const reason of ["interrupted", "time limit"]) expect(of("over", { reason, saved: true }).title).not.toContain("one");
   });
 
   test.each(["training", "task"])("explain the controls before the %s, on touch screens in words", (trial) => {
@@ -31,16 +36,16 @@ describe("dialogs", () => {
   });
 
   test("say whether the page was interrupted", () => {
-    expect(dialogs.loading(true).texts).not.toEqual(dialogs.loading(false).texts);
+    expect(of("loading", { wanted: true }).texts).not.toEqual(of("loading").texts);
   });
 
   test("offer no end of a training before its time", () => {
     const ends = (/** @type {dialogs.Dialog} */ { buttons = [] }) => buttons.some(([, action]) => action === "leave");
     for (const early of [true, false]) {
       expect(ends(dialogs.instructions("training", 1, !early, [], null))).toBe(!early);
-      expect(ends(dialogs.ending(early ? 12 : 0))).toBe(!early);
+      expect(ends(of("ending", {}, early ? 12 : 0))).toBe(!early);
     }
-    expect(dialogs.ending(12).texts[0]).toContain("in 12 s");
+    expect(of("ending", {}, 12).texts[0]).toContain("in 12 s");
   });
 
   test("run the actions of their buttons", () => {
@@ -51,7 +56,7 @@ describe("dialogs", () => {
     const run = vi.fn();
     const closed = vi.fn();
     const panel = new Panel(dialog, { run }, closed);
-    panel.show(dialogs.paused("asked"));
+    panel.show(of("paused", { reason: "asked" }));
     expect([panel.open, panel.title, document.activeElement?.textContent]).toEqual([true, "Paused", "Continue"]);
     dialog.querySelector("button")?.click();
     expect(run).toHaveBeenCalledOnce();
