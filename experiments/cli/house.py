@@ -2,8 +2,6 @@
 
 import argparse
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -149,6 +147,7 @@ def _gallery(arguments: argparse.Namespace) -> int:
 
 def _generate(arguments: argparse.Namespace) -> int:
     from experiments.house import House
+    from experiments.record.files import replacing_folder
     from experiments.session.house_pictures import draw_house
     from mjsim.house.catalogue.model_files import copy_house
 
@@ -157,7 +156,7 @@ def _generate(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"{out} exists; name a new folder, or replace a generated house with --force")
     rooms = "" if arguments.rooms is None else f"?rooms={arguments.rooms}"
     house = House.load(f"generated:{arguments.seed}{rooms}")
-    with _replaced(out) as folder:
+    with replacing_folder(out) as folder:
         copy_house(house.catalogue.house_path, folder)
         if not arguments.no_pictures:
             draw_house(house, folder)
@@ -195,6 +194,7 @@ def _export_dataset(arguments: argparse.Namespace) -> int:
     from mjsim.importing import require_extra
 
     require_extra()
+    from experiments.record.files import replacing_folder
     from mjsim.formats.habitat_writer import export_habitat
 
     out: Path = arguments.out
@@ -206,24 +206,10 @@ def _export_dataset(arguments: argparse.Namespace) -> int:
     settings = {"objects": OBJECTS, "points": POINTS, **given}
     seeds = range(first, first + (arguments.episodes or 1))
     episodes = [house.sample_episode(seed=seed, **settings) for seed in seeds]
-    with _replaced(out) as folder:
+    with replacing_folder(out) as folder:
         name = export_habitat(house.catalogue, episodes, folder)
     print(f"{out / 'scenes' / name}.scene_instance.json ({len(episodes)} episodes)")
     return 0
-
-
-@contextmanager
-def _replaced(out: Path) -> Iterator[Path]:
-    from mjsim.support.files import exchange, work_folder
-
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with work_folder(out.parent) as folder:
-        yield folder
-        folder.chmod(0o755)
-        if out.exists():
-            exchange(folder, out)
-        else:
-            folder.rename(out)
 
 
 def _write(scene: Any, path: Path) -> None:

@@ -6,7 +6,8 @@ import io
 import json
 import re
 import zipfile
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import RecordError
-from mjsim.support.files import check_input, read_bytes, read_text, replacing, write_text_atomically
+from mjsim.support.files import (
+    check_input,
+    exchange,
+    read_bytes,
+    read_text,
+    replacing,
+    work_folder,
+    write_text_atomically,
+)
 from mjsim.support.files import read_json as strict_json
 
 # The data type (a NumPy name or `TEXT`) and the shape of an array. A dimension of None allows any length.
@@ -97,6 +106,19 @@ def read_json(path: Path) -> Any:
         raise RecordError(f"cannot read {path}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:  # not JSON, not UTF-8, or nested too deeply
         raise RecordError(f"{path} is not JSON: {error}") from error
+
+
+@contextmanager
+def replacing_folder(folder: Path, mode: int = 0o755) -> Iterator[Path]:
+    """Replace a folder atomically. Yield a temporary folder, which becomes `folder` on success."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with work_folder(folder.parent) as work:
+        yield work
+        work.chmod(mode)
+        if folder.exists():
+            exchange(work, folder)
+        else:
+            work.rename(folder)
 
 
 CHECKSUMS = "SHA256SUMS"

@@ -10,7 +10,7 @@ from typing import Any
 
 from experiments.analysis.study.measures import LIKERT_PREFIX
 from experiments.errors import RecordError
-from experiments.record.files import csv_text, write_json
+from experiments.record.files import csv_text, replacing_folder, write_json
 from experiments.study.data.collect import FREE, Collected, collect, harmless, person_name
 from experiments.study.data.copies import INDEX, note_copy
 from experiments.study.file import Study
@@ -19,7 +19,7 @@ from experiments.visit.plan import SURVEY
 from experiments.visit.procedure import ATTEMPTS
 from experiments.visit.store import Answer, PersonRow, Store, TrialRow
 from experiments.visit.texts.items import Item
-from mjsim.support.files import exchange, work_folder, write_text_atomically
+from mjsim.support.files import write_text_atomically
 
 DESCRIPTION, README, IGNORED = "dataset_description.json", "README.md", ".psychds-ignore"
 DATA, RUNS, CODEBOOK = "data", "runs", Path("documentation", "codebook.csv")
@@ -102,20 +102,14 @@ async def export(study: Study, store: Store, folder: Path, out: Path, *, replace
         "answers": list(_answers(study, answers)),
         "texts": [{"participant": p, "item": item, "text": words} for p, item, words in found.texts],
     }
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with work_folder(out.parent) as work:
-        made = work / "export"
+    with replacing_folder(out, 0o700) as made:
         _write(made, study, {name: table for name, table in tables.items() if table})
         for row in trials:
             shutil.copytree(folder / row.folder, made / RUNS / _name(row) / row.phase)
         (made / INDEX).write_bytes((out / INDEX).read_bytes() if (out / INDEX).is_file() else b"")
-        for path in (made, *made.rglob("*")):
+        for path in made.rglob("*"):
             path.chmod(0o700 if path.is_dir() else 0o600)
         note_copy(folder, "export", out)
-        if out.exists():
-            exchange(made, out)
-        else:
-            made.rename(out)
     return Exported(len(found.rows), len(trials), found)
 
 

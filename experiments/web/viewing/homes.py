@@ -13,6 +13,7 @@ import numpy as np
 
 from experiments.errors import ConfigError
 from experiments.house import House
+from experiments.record.files import replacing_folder
 from experiments.session.camera_path import camera_path
 from experiments.session.house_pictures import WEBP, floor_plan, largest_rooms, room_views
 from experiments.web.viewing.page import run_page
@@ -23,7 +24,7 @@ from mjsim.house.catalogue.generated_names import parse_name
 from mjsim.house.catalogue.house_ref import parse_house
 from mjsim.house.compiled.house import compiled_house
 from mjsim.render import Renderer
-from mjsim.support.files import exchange, source_digest, work_folder
+from mjsim.support.files import source_digest
 from mjsim.values.person_parameters import PersonParameters
 
 PLAN, VIEW = (480, 400), (300, 200)  # width and height of the floor plan and of a view, in pixels
@@ -98,7 +99,7 @@ def draw_home(name: str, folder: Path) -> GalleryHome:
     house = House.of(catalogue)
     shown = catalogue.name if catalogue.ref.kind == "generated" else name
     count, area = len(house.rooms.labels), round(house.rooms.area, 1)
-    with work_folder(folder.parent) as work:
+    with replacing_folder(folder) as work:
         home = GalleryHome(shown, catalogue.label, count, area, _draw(house, work), digest)
         scene = {
             file: content
@@ -107,11 +108,6 @@ def draw_home(name: str, folder: Path) -> GalleryHome:
         }
         (work / PAGE).write_text(tour_page(house, scene, f"{home.size}, {home.origin}"), "utf-8")
         (work / ABOUT).write_bytes(msgspec.json.encode(home))
-        work.chmod(0o755)
-        if folder.exists():
-            exchange(work, folder)
-        else:
-            work.rename(folder)
     return home
 
 
