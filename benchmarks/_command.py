@@ -54,7 +54,7 @@ def load(path: Path) -> ModuleType:
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "bench", run, description=DESCRIPTION)
+    parser = add_command(commands, "bench", run, DESCRIPTION)
     names = ", ".join(benchmark_names())
     parser.add_argument("name", metavar="NAME", help=f"benchmark: {names}")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")

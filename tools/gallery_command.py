@@ -15,7 +15,7 @@ from above with 6, 12, 18 and 24 objects, and the shortest way to tidy it in the
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "gallery", run, description=DESCRIPTION)
+    parser = add_command(commands, "gallery", run, DESCRIPTION)
     parser.add_argument(
         "what", nargs="?", choices=("pictures", "levels"), default="pictures", help="what to draw"
     )

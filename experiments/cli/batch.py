@@ -35,7 +35,7 @@ commands read like run directories."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "batch", run, description=DESCRIPTION)
+    parser = add_command(commands, "batch", run, DESCRIPTION)
     parser.add_argument(
         "design",
         nargs="?",

@@ -21,7 +21,7 @@ it cannot: loading it would fail by the same rules."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "check", run, description=DESCRIPTION)
+    parser = add_command(commands, "check", run, DESCRIPTION)
     parser.add_argument(
         "path",
         metavar="PATH",

@@ -28,7 +28,7 @@ the differences), both with 95 % confidence intervals. Trials without a counterp
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "compare", run, description=DESCRIPTION)
+    parser = add_command(commands, "compare", run, DESCRIPTION)
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a batch")
     parser.add_argument(
         "--metrics",

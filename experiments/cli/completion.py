@@ -18,7 +18,7 @@ examples:
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "completion", run, description=DESCRIPTION)
+    parser = add_command(commands, "completion", run, DESCRIPTION)
     parser.epilog = EPILOG
     parser.add_argument("shell", choices=("bash", "zsh"), help="shell that will run the script")
 

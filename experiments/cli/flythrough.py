@@ -22,7 +22,7 @@ in each, and pauses at each bin. Captions name the room and the bin. Equal optio
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "flythrough", run, description=DESCRIPTION)
+    parser = add_command(commands, "flythrough", run, DESCRIPTION)
     add_setting(parser, "house", default="apartment")
     parser.add_argument("--out", type=Path, required=True, metavar="FILM.mp4", help="film to write")
     parser.add_argument(

@@ -42,25 +42,25 @@ drawn again."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "house", run, description=SAMPLE)
+    parser = add_command(commands, "house", run, SAMPLE)
     _add_episode(parser, OBJECTS)
     parser.add_argument("--out", type=Path, metavar="PATH", help="file to write, .xml or .glb (required)")
     add_force(parser)
     kinds = parser.add_subparsers(title="other commands", metavar="COMMAND", action=_Commands)
-    one = add_command(kinds, "generate", _generate, summary="generate a house", description=GENERATE)
+    one = add_command(kinds, "generate", _generate, GENERATE, "generate a house")
     one.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the house")
     rooms = "number of rooms, 1 to 10 (default: drawn from the seed)"
     one.add_argument("--rooms", type=int, metavar="N", help=rooms)
     one.add_argument("--no-pictures", action="store_true", help="write no pictures")
     _add_out(one, "folder to create")
-    one = add_command(kinds, "export", _export, summary="export a house", description=EXPORT)
+    one = add_command(kinds, "export", _export, EXPORT, "export a house")
     one.add_argument("--format", choices=[HABITAT, PROCTHOR], default=HABITAT, help="format")
     _add_episode(one, None)
     one.add_argument(
         "--episodes", type=number(1, MAX_COUNT), metavar="N", help="number of episodes (default: 1)"
     )
     _add_out(one, "folder to create, or file to write (procthor)")
-    one = add_command(kinds, "gallery", _gallery, summary="draw homes", description=GALLERY)
+    one = add_command(kinds, "gallery", _gallery, GALLERY, "draw homes")
     one.add_argument("sources", nargs="+", metavar="SOURCE", help="a house, or a range of seeds")
     cores = f"number of homes at a time (default: one per core, here {os.cpu_count()})"
     one.add_argument("--workers", type=number(1, MAX_COUNT), default=os.cpu_count(), metavar="N", help=cores)

@@ -50,9 +50,7 @@ def add_parser(commands: Any) -> None:
         "import", help=None, description="Import objects, houses and episodes from files of other software."
     )
     kinds = top.add_subparsers(title="what to import", metavar="KIND", required=True)
-    parser = add_command(
-        kinds, "object", run, summary="import an object from a mesh", description=DESCRIPTION
-    )
+    parser = add_command(kinds, "object", run, DESCRIPTION, "import an object from a mesh")
     parser.add_argument("file", type=Path, metavar="FILE", help=".glb, .obj, .stl or .ply")
     add = parser.add_argument
     add("--category", required=True, metavar="NAME", help="category in the house, whose bin takes the object")
@@ -90,7 +88,7 @@ def _add_shape(parser: argparse.ArgumentParser, units: str, up: str) -> Any:
 
 
 def _add_house(kinds: Any) -> None:
-    parser = add_command(kinds, "house", run_house, summary="import a house from a scene", description=HOUSE)
+    parser = add_command(kinds, "house", run_house, HOUSE, "import a house from a scene")
     add = parser.add_argument
     add(
         "source",
@@ -175,9 +173,7 @@ def _print(title: str, decisions: Sequence[ImportDecision]) -> None:
 
 
 def _add_episodes(kinds: Any) -> None:
-    parser = add_command(
-        kinds, "episodes", run_episodes, summary="measure the disorder in episodes", description=EPISODES
-    )
+    parser = add_command(kinds, "episodes", run_episodes, EPISODES, "measure the disorder in episodes")
     add = parser.add_argument
     add("files", type=Path, nargs="+", metavar="FILE", help="RoomR (.pkl.gz) or Housekeep (.json.gz) file")
     add("--out", type=Path, required=True, metavar="DIR", help="output folder, created if missing")

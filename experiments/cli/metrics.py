@@ -31,7 +31,7 @@ FORMATS = (".csv", ".json")
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "metrics", run, description=DESCRIPTION)
+    parser = add_command(commands, "metrics", run, DESCRIPTION)
     parser.add_argument(
         "directory", type=Path, metavar="DIR", help="run directory, or folder of a batch or of `mjsim play`"
     )

@@ -100,7 +100,6 @@ def add_command(
     commands: Any,
     name: str,
     run: Callable[[argparse.Namespace], int],
-    *,
     description: str,
     summary: str | None = None,
 ) -> argparse.ArgumentParser:

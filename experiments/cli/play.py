@@ -59,7 +59,7 @@ others. Ctrl-C stops the server, and the same command resumes."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "play", run, description=DESCRIPTION)
+    parser = add_command(commands, "play", run, DESCRIPTION)
     add_task_options(parser, OBJECTS)
     parser.add_argument("--user", default=HUMAN, metavar="NAME", help="name of the participant")
     add_trial_options(parser, phases=",".join(PHASES))

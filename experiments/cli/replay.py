@@ -33,7 +33,7 @@ With --video, film the replay: as recorded, or in another size, from another cam
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "replay", run, description=DESCRIPTION)
+    parser = add_command(commands, "replay", run, DESCRIPTION)
     parser.add_argument("directory", type=Path, metavar="DIR", help="run directory or packed trial")
     parser.add_argument(
         "--from",

@@ -62,7 +62,7 @@ events.jsonl and plan.json hold every plan that was shown, and `mjsim replay` sh
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "run", run, description=DESCRIPTION)
+    parser = add_command(commands, "run", run, DESCRIPTION)
     add_task_options(parser, OBJECTS)
     add_setting(parser, "user")
     add_trial_options(parser)

@@ -19,7 +19,7 @@ option `-A --extract` unpacks them."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "unpack", run, description=DESCRIPTION)
+    parser = add_command(commands, "unpack", run, DESCRIPTION)
     parser.add_argument("out", type=Path, metavar="DIR", help="folder of a batch")
     parser.add_argument("names", nargs="*", metavar="NAME", help="names of trials (default: all)")
 

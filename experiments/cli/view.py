@@ -20,7 +20,7 @@ but no server and no mjsim."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "view", run, description=DESCRIPTION)
+    parser = add_command(commands, "view", run, DESCRIPTION)
     parser.add_argument("directory", type=Path, metavar="DIR", help="run directory or packed trial")
     parser.add_argument(
         "--out", type=Path, metavar="FILE.html", help="write the page to a file instead of opening it"

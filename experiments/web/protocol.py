@@ -101,17 +101,7 @@ class Beat(WireMessage, frozen=True):
 
 
 class Display(WireMessage, frozen=True):
-    """A report on the display quality over the last 5 s, which is written to the log.
-
-    Attributes:
-        width: Width of the view in CSS pixels, like `height`.
-        pixel_ratio: Device pixels per CSS pixel.
-        frame_ms: Median time between two pictures, in milliseconds.
-        frame_ms_95: 95th percentile of the time between two pictures, in milliseconds.
-        latency_ms: Median time from an input to the first picture that shows its effect, in milliseconds. If
-            the browser draws, the time to the first server state that includes it. None without inputs.
-        field_of_view: Horizontal field of view, in radians, if the participant may choose it.
-    """
+    """A report on the display quality over the last 5 s, which is written to the log as a `DisplayEvent`."""
 
     draw: Drawer
     renderer: Annotated[str, msgspec.Meta(max_length=200)]

@@ -32,11 +32,7 @@ A good fit does not mean that the model is true. docs/paper.md explains what can
 def add_parser(commands: Any) -> None:
     """Add the subcommand `calibrate` to `mjsim study`."""
     parser = add_command(
-        commands,
-        "calibrate",
-        run,
-        summary="fit the guest to the published rows at 6 objects",
-        description=DESCRIPTION,
+        commands, "calibrate", run, DESCRIPTION, "fit the guest to the published rows at 6 objects"
     )
     parser.add_argument(
         "folders", type=Path, nargs="+", metavar="DIR", help="folder of a pool; results go to the first"

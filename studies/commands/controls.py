@@ -16,9 +16,7 @@ still agrees with a published result, that result is not evidence for the missin
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand `controls` to `mjsim study`."""
-    parser = add_command(
-        commands, "controls", run, summary="simulate a study's negative controls", description=DESCRIPTION
-    )
+    parser = add_command(commands, "controls", run, DESCRIPTION, "simulate a study's negative controls")
     add_study(parser, nargs="?", default="paper")
     parser.add_argument("--only", metavar="NAME", help="simulate only this control (default: all)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the controls")

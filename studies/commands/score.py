@@ -22,9 +22,7 @@ If every cell has at least 200 people, they are treated as a population: effect 
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand `score` to `mjsim study`."""
-    parser = add_command(
-        commands, "score", run, summary="compare a study with the published one", description=DESCRIPTION
-    )
+    parser = add_command(commands, "score", run, DESCRIPTION, "compare a study with the published one")
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a study or a batch")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed for drawing these studies")
     parser.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: DIR/analysis)")

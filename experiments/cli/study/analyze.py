@@ -25,9 +25,7 @@ such."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(
-        commands, "analyze", run, summary="analyse a study and write a report", description=DESCRIPTION
-    )
+    parser = add_command(commands, "analyze", run, DESCRIPTION, "analyse a study and write a report")
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a study, a batch or `mjsim play`")
     parser.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: DIR/analysis)")
     parser.add_argument(

@@ -30,9 +30,7 @@ and phone size. Problems are listed with their line in the file. The exit code i
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(
-        commands, "check", run, summary="check that a study is ready", description=DESCRIPTION
-    )
+    parser = add_command(commands, "check", run, DESCRIPTION, "check that a study is ready")
     add_study_file(parser)
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the screenshots")
     parser.add_argument(

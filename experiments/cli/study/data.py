@@ -72,44 +72,42 @@ until they are paid. The server does the same daily. Run this command after the 
 
 
 def add_parser(commands: Any) -> None:
-    parser = _add(commands, "collect", run_collect, "write the tables of a study", COLLECT)
+    parser = _add(commands, "collect", run_collect, COLLECT, "write the tables of a study")
     parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="folder for the tables")
     parser.add_argument(
         "--rehearsal", action="store_true", help="DIR is of a rehearsal, with simulated participants"
     )
     add_force(parser, "replace existing tables")
-    parser = _add(commands, "export", run_export, "export all data of a study", EXPORT)
+    parser = _add(commands, "export", run_export, EXPORT, "export all data of a study")
     parser.add_argument("--out", type=Path, required=True, metavar="EXPORT", help="folder to create")
     add_force(parser, "replace an earlier export")
     parser = _add(
-        commands, "reconcile", run_reconcile, "mark participants that the platform does not know", RECONCILE
+        commands, "reconcile", run_reconcile, RECONCILE, "mark participants that the platform does not know"
     )
     parser.add_argument("submissions", type=Path, metavar="SUBMISSIONS.csv", help="list from the platform")
     parser.add_argument(
         "--who", default="mjsim", metavar="NAME", help="name of the person who does this, for the audit log"
     )
-    parser = _add(commands, "backup", run_backup, "back up the database of a study", BACKUP)
+    parser = _add(commands, "backup", run_backup, BACKUP, "back up the database of a study")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.db", help="file to write")
-    parser = add_command(
-        commands, "restore", run_restore, summary="restore a backup to an empty database", description=RESTORE
-    )
+    parser = add_command(commands, "restore", run_restore, RESTORE, "restore a backup to an empty database")
     parser.add_argument("backup", type=Path, metavar="FILE.db", help="backup to read")
     parser.add_argument(
         "database", metavar="DATABASE", help="path of a new SQLite file, or URL of an empty database"
     )
-    parser = _add(commands, "erase", run_erase, "delete all data of a participant", ERASE)
+    parser = _add(commands, "erase", run_erase, ERASE, "delete all data of a participant")
     parser.add_argument("person", metavar="PERSON", help="participant as named in tables, such as p00012")
     parser.add_argument(
         "--who", required=True, metavar="NAME", help="name of the person who deletes, for the audit log"
     )
-    parser = _add(commands, "forget", run_forget, "delete identifying data by date", FORGET)
+    parser = _add(commands, "forget", run_forget, FORGET, "delete identifying data by date")
     parser.add_argument(
         "--dry-run", action="store_true", help="list what would be deleted, but delete nothing"
     )
 
 
-def _add(commands: Any, name: str, run: Any, summary: str, description: str) -> argparse.ArgumentParser:
-    parser = add_command(commands, name, run, summary=summary, description=description)
+def _add(commands: Any, name: str, run: Any, description: str, summary: str) -> argparse.ArgumentParser:
+    parser = add_command(commands, name, run, description, summary)
     add_served_study(parser)
     add_database(parser)
     return parser

@@ -35,7 +35,7 @@ the study stopped. The audit log records the amount and the reason. --send pays 
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "pay", run, summary="decide and make payments", description=DESCRIPTION)
+    parser = add_command(commands, "pay", run, DESCRIPTION, "decide and make payments")
     add_served_study(parser)
     parser.add_argument("--dry-run", action="store_true", help="print payments, but record nothing")
     parser.add_argument(

@@ -19,9 +19,7 @@ explains the consequences."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(
-        commands, "power", run, summary="compute the sample size of a study", description=DESCRIPTION
-    )
+    parser = add_command(commands, "power", run, DESCRIPTION, "compute the sample size of a study")
     parser.add_argument("study", metavar="STUDY.toml", help="study file or design (docs/batches.md)")
     parser.add_argument(
         "--pool", type=Path, required=True, metavar="DIR", help="folder of simulated participants"

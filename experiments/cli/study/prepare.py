@@ -21,17 +21,13 @@ exclusions and reports departures."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "init", run_init, summary="write a study file", description=INIT)
+    parser = add_command(commands, "init", run_init, INIT, "write a study file")
     parser.add_argument(
         "study", type=Path, nargs="?", default=Path("study.toml"), metavar="STUDY.toml", help="file to write"
     )
     add_force(parser, "replace an existing file")
     parser = add_command(
-        commands,
-        "preregister",
-        run_preregister,
-        summary="freeze a study before data are collected",
-        description=PREREGISTER,
+        commands, "preregister", run_preregister, PREREGISTER, "freeze a study before data are collected"
     )
     add_study_file(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="ZIP file to write")

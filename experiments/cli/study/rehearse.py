@@ -31,11 +31,7 @@ interruption."""
 
 def add_parser(commands: Any) -> None:
     parser = add_command(
-        commands,
-        "rehearse",
-        run,
-        summary="rehearse a study with simulated participants",
-        description=DESCRIPTION,
+        commands, "rehearse", run, DESCRIPTION, "rehearse a study with simulated participants"
     )
     add_study_file(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="folder for the rehearsal")

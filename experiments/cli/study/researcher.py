@@ -28,9 +28,7 @@ terminal, or generated with --generate."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(
-        commands, "researcher", run, summary="manage the accounts of researchers", description=DESCRIPTION
-    )
+    parser = add_command(commands, "researcher", run, DESCRIPTION, "manage the accounts of researchers")
     parser.add_argument("what", choices=("add", "change", "disable", "enable", "list"), help="action")
     add_served_study(parser)
     parser.add_argument("name", nargs="?", metavar="NAME", help="name of the account: a-z, 0-9 and . _ @ -")

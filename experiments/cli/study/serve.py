@@ -56,7 +56,7 @@ another host. Each visit then continues on the host that has its journal."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "serve", run, summary="serve a study", description=DESCRIPTION)
+    parser = add_command(commands, "serve", run, DESCRIPTION, "serve a study")
     add_study_file(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the study")
     add_database(parser)
@@ -92,9 +92,7 @@ def add_parser(commands: Any) -> None:
 
 
 def _add_hosts(commands: Any) -> None:
-    parser = add_command(
-        commands, "hosts", run_hosts, summary="manage the hosts that serve a study", description=HOSTS
-    )
+    parser = add_command(commands, "hosts", run_hosts, HOSTS, "manage the hosts that serve a study")
     add_served_study(parser)
     group = parser.add_mutually_exclusive_group()
     group.add_argument("--drain", metavar="NAME", help="stop new visits on a host")

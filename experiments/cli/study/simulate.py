@@ -18,9 +18,7 @@ are not evidence about people."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(
-        commands, "simulate", run, summary="simulate the participants of a study", description=DESCRIPTION
-    )
+    parser = add_command(commands, "simulate", run, DESCRIPTION, "simulate the participants of a study")
     add_study(parser)
     add_shards(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the study")

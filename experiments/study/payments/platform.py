@@ -135,6 +135,19 @@ class Api:
             raise UnsureError(f"no answer of the platform: {error or type(error).__name__}") from error
 
 
+class ApiPayer:
+    """The common part of payers, which send requests to the API of their platform."""
+
+    listed_after = LISTED_AFTER
+    shortest_reason = 1
+
+    def __init__(self, url: str, headers: Mapping[str, str]) -> None:
+        self._api = Api(url, headers)
+
+    async def close(self) -> None:
+        await self._api.close()
+
+
 def secret(name: str) -> str:
     """Read a secret from an environment variable. Raises ConfigError if it is missing or invalid."""
     if not (value := os.environ.get(name, "").strip()):

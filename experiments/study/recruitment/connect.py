@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from experiments.study.file import Recruitment
-from experiments.study.payments.platform import LISTED_AFTER, Api, Order, secret
+from experiments.study.payments.platform import ApiPayer, Order, secret
 from experiments.visit.recruiter import Candidate, InvalidLink, Leaving, WayBack
 
 PERSON, ASSIGNMENT, PROJECT = "participantId", "assignmentId", "projectId"
@@ -45,16 +45,11 @@ class Connect:
         return WayBack(self._code, f"{self._site}/participant/project/{self._code}/complete")
 
 
-class ConnectPayer:
+class ConnectPayer(ApiPayer):
     """A payment client for CloudResearch Connect, which pays the reward when an assignment is approved."""
 
-    listed_after = LISTED_AFTER
-    shortest_reason = 1
-
     def __init__(self, settings: Recruitment) -> None:
-        headers = {"X-API-KEY": secret(KEY)}
-        url = f"{settings.api_url or API}/api/v1"
-        self._api = Api(url, headers)
+        super().__init__(f"{settings.api_url or API}/api/v1", {"X-API-KEY": secret(KEY)})
 
     async def find(self, order: Order) -> str | None:
         """Look for a payment in the status of the assignment or in the sum of its bonuses."""
@@ -79,6 +74,3 @@ class ConnectPayer:
         path = f"/assignments/{order.id(PROJECT)}/{action}"
         await self._api.ask("POST", path, json=body, headers=token)
         return action
-
-    async def close(self) -> None:
-        await self._api.close()

@@ -12,7 +12,7 @@ from typing import Any
 
 from experiments.errors import ConfigError
 from experiments.study.file import Recruitment
-from experiments.study.payments.platform import LISTED_AFTER, Api, Order, UnsureError, secret
+from experiments.study.payments.platform import ApiPayer, Order, UnsureError, secret
 from experiments.visit.recruiter import Candidate, InvalidLink, Leaving, Preview, WayBack
 
 ASSIGNMENT, TASK, PERSON, SITE = "assignmentId", "hitId", "workerId", "turkSubmitTo"
@@ -55,11 +55,8 @@ class ExternalQuestion:
         return WayBack(url=f"{site}{SUBMIT}", fields={ASSIGNMENT: identity[ASSIGNMENT], "study": "finished"})
 
 
-class ExternalQuestionPayer:
+class ExternalQuestionPayer(ApiPayer):
     """A payment client for platforms that pay the reward of a task when the assignment is approved."""
-
-    listed_after = LISTED_AFTER
-    shortest_reason = 1
 
     def __init__(self, settings: Recruitment) -> None:
         if not settings.api_url:
@@ -68,8 +65,7 @@ class ExternalQuestionPayer:
             "Authorization": f"Bearer {secret(TOKEN)}",
             "Content-Type": "application/x-amz-json-1.1",
         }
-        url = settings.api_url
-        self._api = Api(url, headers)
+        super().__init__(settings.api_url, headers)
 
     async def find(self, order: Order) -> str | None:
         """Look for a payment in the status of the assignment, or for its key in the reasons for bonuses."""
@@ -98,9 +94,6 @@ class ExternalQuestionPayer:
         }
         await self._ask("SendBonus", bonus)
         return "bonus"
-
-    async def close(self) -> None:
-        await self._api.close()
 
     async def _ask(self, operation: str, body: Mapping[str, Any]) -> Any:
         target = {"X-Amz-Target": f"{OPERATIONS}.{operation}"}

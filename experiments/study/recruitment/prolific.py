@@ -7,7 +7,7 @@ from typing import Any
 from urllib.parse import urlencode
 
 from experiments.study.file import Recruitment
-from experiments.study.payments.platform import Api, DeclinedError, Order, UnsureError, secret
+from experiments.study.payments.platform import ApiPayer, DeclinedError, Order, UnsureError, secret
 from experiments.visit.recruiter import Candidate, InvalidLink, Leaving, WayBack
 
 PERSON, STUDY, SUBMISSION = "PROLIFIC_PID", "STUDY_ID", "SESSION_ID"
@@ -49,7 +49,7 @@ class Prolific:
         return WayBack(code, f"{self._site}/submissions/complete?{urlencode({'cc': code})}")
 
 
-class ProlificPayer:
+class ProlificPayer(ApiPayer):
     """A payment client for Prolific, which pays the reward of a study when a submission is approved.
 
     The payment for screened-out participants is set on the platform. Partial payments are made as bonuses,
@@ -61,9 +61,7 @@ class ProlificPayer:
     shortest_reason = 100
 
     def __init__(self, settings: Recruitment) -> None:
-        headers = {"Authorization": f"Token {secret(TOKEN)}"}
-        url = f"{settings.api_url or API}/api/v1"
-        self._api = Api(url, headers)
+        super().__init__(f"{settings.api_url or API}/api/v1", {"Authorization": f"Token {secret(TOKEN)}"})
         self._screened_out = settings.screened_out
 
     async def find(self, order: Order) -> str | None:
@@ -90,9 +88,6 @@ class ProlificPayer:
         bonus = await self._prepare(order)
         await self._api.ask("POST", f"/bulk-bonus-payments/{bonus}/pay/")
         return f"bonus {bonus}"
-
-    async def close(self) -> None:
-        await self._api.close()
 
     async def _prepare(self, order: Order) -> str:
         row: Mapping[str, Any] = {

@@ -11,7 +11,7 @@
 /** @typedef {{ type: "inputs"; inputs: Array<Input>; until?: number | null }} Inputs The participant's inputs in chronological order. Each input is sent only once. */
 /** @typedef {{ type: "seen"; frame: number }} Seen An acknowledgement that the browser has shown the frame with this number. */
 /** @typedef {{ type: "beat" }} Beat A heartbeat. The server sends two per second, and the page answers each of them. */
-/** @typedef {{ type: "display"; draw: "browser" | "server"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null; field_of_view?: number | null }} Display A report on the display quality over the last 5 s, which is written to the log. */
+/** @typedef {{ type: "display"; draw: "browser" | "server"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null; field_of_view?: number | null }} Display A report on the display quality over the last 5 s, which is written to the log as a `DisplayEvent`. */
 /** @typedef {{ type: "draw"; draw: "browser" | "server"; reason: string }} Draw A notice that the browser or the server now draws the view. It is logged with its reason. */
 /** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "picture lost" | "restarted" | "silent" | "taken over" }} Pause A request to stop the clock. The reason is written to the log. */
 /** @typedef {{ type: "blur"; away: boolean }} Blur A notice that the page has lost or regained the keyboard focus. It is written to the log. */
