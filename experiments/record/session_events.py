@@ -8,12 +8,13 @@ Seconds = Annotated[float, msgspec.Meta(ge=0.0)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
 
 
-def _tag(class_name: str) -> str:
-    return class_name.removesuffix("Event").lower()
-
-
 class LoggedEvent(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="event", tag=_tag, kw_only=True
+    msgspec.Struct,
+    frozen=True,
+    forbid_unknown_fields=True,
+    tag_field="event",
+    tag=lambda name: name.removesuffix("Event").lower(),
+    kw_only=True,
 ):
     """A line of the event log.
 

@@ -112,15 +112,9 @@ def _duration(seconds: float) -> str:
     return f"{minutes} min {rest} s" if minutes else f"{rest} s"
 
 
-@functools.cache
-def _modules(entry: str) -> tuple[str, ...]:
-    """Return the paths of all modules that a page needs. The browser preloads them in parallel."""
-    return tuple(modules_of(entry))
-
-
 _templates = Jinja2Templates(CLIENT / "templates")
 _templates.env.filters.update(counted=counted, duration=_duration, filled=filled)
-_templates.env.globals.update(modules=_modules, static=static_url)
+_templates.env.globals.update(modules=functools.cache(modules_of), static=static_url)
 _templates.env.trim_blocks = True
 _templates.env.auto_reload = False  # template files are not checked for changes on each request
 

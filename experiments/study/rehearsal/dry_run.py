@@ -141,7 +141,8 @@ class _Walk:
         async def watch(name: str, page: httpx.Response) -> None:
             if planned.leaves is None and name not in shown:
                 shown.append(name)
-                self.walked.words[name] = _words_of(page.text) if "data-trial" not in page.text else 0
+                words = _UNREAD.sub(" ", page.text).split()
+                self.walked.words[name] = len(words) if "data-trial" not in page.text else 0
                 await self._photograph(name, str(page.url), page.text if name.endswith(REFUSED) else "")
                 if name == TASK:
                     await self._photograph(HELP, str(page.url), "")
@@ -214,10 +215,6 @@ class _Walk:
         for name, state in (("paused", "paused"), ("full", "closed")):
             await store.set_state(cast(StudyState, state), "check")
             await self._photograph(name, f"{around.base}/?{urlencode(ids)}", "")
-
-
-def _words_of(page: str) -> int:
-    return len(_UNREAD.sub(" ", page).split())
 
 
 class _Server(uvicorn.Server):

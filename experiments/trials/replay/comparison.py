@@ -89,8 +89,8 @@ def _compare_events(replayer: Replayer, replayed: Record) -> Iterator[Mismatch]:
         for step, event in zip(record.steps_of_events, record.events, strict=True)
         if replayer.first <= step < end and event["event"] in COMPARED_EVENTS and not _is_broken_end(event)
     ]
-    simulated = replayed.events[replayer.logged_before :]
-    found = [_comparable(event) for event in simulated if event["event"] in COMPARED_EVENTS]
+    copied = record.events_before(replayer.first) if replayer.first else 0  # events that come from the record
+    found = [_comparable(event) for event in replayed.events[copied:] if event["event"] in COMPARED_EVENTS]
     for (step, then), now in zip(logged, found, strict=False):
         if then != now:
             yield Mismatch(step, f"{EVENTS}: {_difference(then, now)}", EVENTS)

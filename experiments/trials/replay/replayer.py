@@ -86,11 +86,6 @@ class Replayer:
         """Return the record of the replay from step `first` on. The log also contains all earlier events."""
         return self._written.record()
 
-    @property
-    def logged_before(self) -> int:
-        """The number of events in the replay's log that were copied from the record."""
-        return self.record.events_before(self.first) if self.first else 0
-
     def _restored_session(self, viewer: Viewer | None) -> Session:
         record = self.record
         evaluator = RegretEvaluator(self.house.geodesics, capacity=self._world.options.capacity)

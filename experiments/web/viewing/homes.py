@@ -3,7 +3,6 @@
 import functools
 import hashlib
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -106,7 +105,8 @@ def draw_home(name: str, folder: Path) -> GalleryHome:
             for file, content in export_scene(catalogue).items()
             if not file.startswith("objects/")
         }
-        (work / PAGE).write_text(tour_page(house, scene, f"{home.size}, {home.origin}"), "utf-8")
+        page = run_page(house.catalogue.label, _tour(house), scene, tour=f"{home.size}, {home.origin}")
+        (work / PAGE).write_text(page, "utf-8")
         (work / ABOUT).write_bytes(msgspec.json.encode(home))
     return home
 
@@ -136,11 +136,6 @@ def _code() -> str:
     """Return a hash of the source files that determine the contents of a gallery."""
     page = run_page("", {}, {}, tour="")
     return source_digest("mjsim", "experiments") + hashlib.sha256(page.encode()).hexdigest()
-
-
-def tour_page(house: House, scene: Mapping[str, bytes], caption: str) -> str:
-    """Return a self-contained HTML page that shows a home from outside, from above, and on a tour."""
-    return run_page(house.catalogue.label, _tour(house), scene, tour=caption)
 
 
 def _tour(house: House) -> dict[str, Any]:

@@ -114,7 +114,8 @@ class Drawer:
             began = time.perf_counter()
             size.limit(job.view.width, job.view.height)
             if encoded_for != (job.view, size.index):
-                encoder, encoded_for = _encoder(job.view, size.index), (job.view, size.index)
+                encoder = H264Encoder(*SIZES[size.index]) if job.view.codec == "h264" else JpegEncoder()
+                encoded_for = (job.view, size.index)
                 job = job._replace(key=True)
             if job.view is not shown_to:
                 self._send(self.pictures())
@@ -170,7 +171,3 @@ class Drawer:
             profile = FAST if size else COARSE
             self._renderers[size] = Renderer(self._scene.model, width=width, height=height, profile=profile)
         return self._renderers[size]
-
-
-def _encoder(view: View, size: int) -> Encoder:
-    return H264Encoder(*SIZES[size]) if view.codec == "h264" else JpegEncoder()
