@@ -20,28 +20,32 @@ START = """async ([position, heading]) => {
   const device = new IWER.XRDevice(IWER.metaQuest3);
   device.installRuntime({ forceInstall: true });
   device.stereoEnabled = true;
-  const { Headset, hasHeadset } = await import("/static/drawing/xr.js");
-  const { drawPanel } = await import("/static/drawing/xr_panel.js");
-  const panel = Object.assign(document.createElement("canvas"), { width: 1024, height: 512 });
+  const { HeadsetPage } = await import("/static/headset.js");
   const plain = { detail: "Kitchen\\n-> Dish bin", number: null, done: false, carried: false };
   const row = (text, more) => ({ text, ...plain, ...more });
-  drawPanel(panel, {
+  const hud = {
     checklist_title: "Your plan", checklist: [row("Mug", { done: true }), row("Pan", { current: true }), row("Book")],
     bins: [{ label: "Dish bin", place: "Kitchen" }], inventory: [{ label: null }, { label: "Pan" }],
     message: null, delivered: 1, total: 3, scroll: 0,
-  }, "1:07");
-  const headset = new Headset(world, panel);
-  const found = await hasHeadset();
-  Object.assign(window, { device, headset, world, frames: 0, over: false });
-  world.onFrame(() => { headset.place(position); world.draw(); frames++; });
-  await headset.enter(heading, () => { over = true; });
-  return found;
+  };
+  const seen = { heading, pitch: 0, held: null, pressed: [] };
+  const headset = new HeadsetPage(world, {
+    look: (turn, pitch) => { seen.heading += turn; seen.pitch += pitch; },
+    hold: (_, held) => { seen.held = held; },
+    press: (name) => seen.pressed.push(name),
+  });
+  const button = document.createElement("button");
+  await headset.offer(button, () => heading);
+  Object.assign(window, { device, seen, world, frames: 0 });
+  world.onFrame(() => { headset.place(position); headset.show(hud, 67); world.draw(); frames++; });
+  button.click();
+  return !button.hidden;
 }"""
 PATIENCE = 60_000  # ms
 AFTER = """async () => {
   const at = frames;
   while (frames < at + 3) await new Promise((resolve) => setTimeout(resolve, 20));
-  return headset.controls();
+  return [seen.held, seen.pressed.splice(0)];
 }"""
 PICTURE = """() => new Promise((resolve) => {
   const at = frames;
@@ -81,16 +85,16 @@ def page(chromium):
 
 def test_a_headset_shows_the_house_and_the_hud_to_both_eyes(page):
     assert page.evaluate(START, [[6.4, 5.2, 1.6], 0.5])
-    page.wait_for_function("frames > 3", timeout=PATIENCE)
+    page.wait_for_function("seen.held && frames > 3", timeout=PATIENCE)
     picture = decoded(base64.b64decode(page.evaluate(PICTURE).partition(",")[2]))
     left, right = np.array_split(picture, 2, axis=1)
     assert min(left.std(), right.std()) > 10
     assert np.abs(left.astype(int) - right).mean() > 1
-    assert page.evaluate("headset.look()") == pytest.approx({"heading": 0.5, "pitch": 0.0}, abs=1e-6)
+    assert page.evaluate("[seen.heading, seen.pitch]") == pytest.approx([0.5, 0.0], abs=1e-6)
 
     turned = [math.cos(0.2), 0.0, math.sin(0.2), 0.0]  # 0.4 rad to the left about the vertical
     page.evaluate("([w, x, y, z]) => device.quaternion.set(x, y, z, w)", turned)
-    page.wait_for_function("headset.look().heading > 0.89", timeout=PATIENCE)
+    page.wait_for_function("seen.heading > 0.89", timeout=PATIENCE)
     page.evaluate(
         """() => {
           device.controllers.left.updateAxes("thumbstick", 0, -1);
@@ -98,8 +102,8 @@ def test_a_headset_shows_the_house_and_the_hud_to_both_eyes(page):
           device.controllers.right.updateButtonValue("trigger", 1);
         }"""
     )
-    assert page.evaluate(AFTER) == {"forward": 1, "left": 0, "pressed": ["right hand"]}
-    assert page.evaluate(AFTER) == {"forward": 1, "left": 0, "pressed": []}
-    page.wait_for_function(f"headset.look().heading < {0.9 - math.pi / 6 + 0.01}", timeout=PATIENCE)
+    assert page.evaluate(AFTER) == [{"forward": 1, "left": 0}, ["right hand"]]
+    assert page.evaluate(AFTER) == [{"forward": 1, "left": 0}, []]
+    page.wait_for_function(f"seen.heading < {0.9 - math.pi / 6 + 0.01}", timeout=PATIENCE)
     page.evaluate("world.stage.renderer.xr.getSession().end()")
-    page.wait_for_function("over", timeout=PATIENCE)
+    page.wait_for_function("Object.keys(seen.held).length === 0", timeout=PATIENCE)
