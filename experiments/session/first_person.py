@@ -28,21 +28,14 @@ from mjsim.world.world import World
 class FirstPersonRenderer:
     """A renderer of first-person frames with the HUD. Use it as a context manager to free the GL context.
 
-    `pictures` is the result of `render_pictures` for the catalogue of the house. If it is None, the pictures are
-    rendered first. Raises RenderError if there is no off-screen GL context, or if the size or the profile is invalid.
+    Raises RenderError if there is no off-screen GL context, or if the size or the profile is invalid.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        house: House,
-        film: FilmConfig,
-        pictures: dict[str, NDArray[np.uint8]] | None = None,
-    ) -> None:
+    def __init__(self, scene: Scene, house: House, film: FilmConfig) -> None:
         _, _, width, height = film.view
         self._renderer = Renderer(scene.model, width=width, height=height, profile=film.profile)
         self._house = house
-        self._pictures = render_pictures(house.catalogue) if pictures is None else pictures
+        self._pictures = render_pictures(house.catalogue)
         self._film = film
         self._compositor = self._new_compositor()
 

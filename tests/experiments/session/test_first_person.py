@@ -6,6 +6,7 @@ import pytest
 from sessions import Recorder
 
 from experiments.record.records import EventLog
+from experiments.session import first_person
 from experiments.session.film_config import FilmConfig
 from experiments.session.first_person import FirstPersonRenderer
 from experiments.trials.setup import prepare_session, trial_episode
@@ -42,7 +43,7 @@ def checked(house):
     scene = compose(trial_episode(DEMO, house), house.catalogue)
     width, height = FILM.view[2:]
     with (
-        FirstPersonRenderer(scene, house, FILM, {}) as drawn,
+        FirstPersonRenderer(scene, house, FILM) as drawn,
         Renderer(scene.model, width=width, height=height, profile="draft") as bare,
     ):
         checker = Checker(drawn, bare)
@@ -72,14 +73,15 @@ def test_panels_cover_at_most_a_quarter_of_the_demos_frames_and_nothing_of_its_v
             assert panels["message"].bottom < top + height // 8, "far above the hands"
 
 
-def test_a_minimap_shows_the_house_from_above_also_if_its_picture_is_drawn_late(house):
+def test_a_minimap_shows_the_house_from_above_also_if_its_picture_is_drawn_late(house, monkeypatch):
     config = TrialConfig(objects=6, assistance="none-minimap", seed=0, fidelity="event", time_limit=1.0)
     scene, recorder = compose(trial_episode(config, house), house.catalogue), Recorder()
     session, world = prepare_session(config, house, scene, EventLog(), recorder)
     session.run()
     state, frames = recorder.shown[0][1], []
     for pictures in ({}, {FLOORPLAN: render_house_map(house.catalogue, house.bounds)}):
-        with FirstPersonRenderer(scene, house, FILM, pictures) as drawn:
+        monkeypatch.setattr(first_person, "render_pictures", lambda _, found=pictures: dict(found))
+        with FirstPersonRenderer(scene, house, FILM) as drawn:
             frames.append(drawn.frame(world.data, state))
     assert state.minimap is not None
     assert (frames[0] == frames[1]).all()
