@@ -51,7 +51,7 @@ await world.load((name) => "/scene/" + name);
 const start = (angle, things) => { world.setFieldOfView(angle); return world.setObjects(things); };
 const picture = (person, eye, markers) => {
   world.setPerson(person);
-  world.setEye(eye);
+  world.camera.setEye(eye);
   world.setMarkers(markers);
   const times = [];
   let url = "";

@@ -156,7 +156,7 @@ export class DrawnView {
     this.world.setPerson({ x, y, heading, hands: state.hands, eyeHeight: scene.gait.eye_height });
     const eye = eyeOf(this.#body, scene.gait);
     if (this.calm) eye.heading = SNAP * Math.round(heading / SNAP);
-    if (!this.headset?.place(eye.position)) this.world.setEye(eye);
+    if (!this.headset?.place(eye.position)) this.world.camera.setEye(eye);
     this.world.draw();
     return { body: this.#body, moving, reach: this.#reachAt() };
   }
@@ -164,7 +164,7 @@ export class DrawnView {
   /** @returns {[number, number] | null} */
   #reachAt() {
     const place = this.#reach?.place;
-    const at = place && this.world.project(place);
+    const at = place && this.world.camera.locate(place);
     return at?.inView ? [at.x, at.y] : null;
   }
 

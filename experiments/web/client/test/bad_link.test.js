@@ -13,12 +13,11 @@ import { DT, EMPTY, GAIT, SPEEDS } from "./walks.js";
 vi.mock("../static/drawing/world.js", () => ({
   World3D: class {
     load = async () => ({ objects: {} });
-    project() {}
+    camera = { setEye() {}, locate() {} };
     loadModels() {}
     setFieldOfView() {}
     setObjects() {}
     setPerson() {}
-    setEye() {}
     draw() {}
   },
 }));

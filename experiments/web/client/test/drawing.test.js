@@ -142,30 +142,30 @@ describe("the eye", () => {
   const eye = { position: [1, 2, 1.6], heading: Math.PI / 2, pitch: 0 };
 
   test("sees what is ahead in the middle, and left of it what lies to the left", () => {
-    world.setEye(eye);
+    world.camera.setEye(eye);
     world.draw();
-    expect(world.project([1, 5, 1.6])).toMatchObject({ x: expect.closeTo(0.5), y: expect.closeTo(0.5), inView: true });
-    expect(world.project([0, 5, 2]).x).toBeLessThan(0.5);
-    expect(world.project([1, 5, 2]).y).toBeLessThan(0.5);
-    expect(world.project([1, 0, 1.6])).toMatchObject({ ahead: false, inView: false });
+    expect(world.camera.locate([1, 5, 1.6])).toMatchObject({ x: expect.closeTo(0.5), y: expect.closeTo(0.5), inView: true });
+    expect(world.camera.locate([0, 5, 2]).x).toBeLessThan(0.5);
+    expect(world.camera.locate([1, 5, 2]).y).toBeLessThan(0.5);
+    expect(world.camera.locate([1, 0, 1.6])).toMatchObject({ ahead: false, inView: false });
   });
 
   test("has the same horizontal field of view in windows of any shape", () => {
-    world.setEye(eye);
+    world.camera.setEye(eye);
     world.setFieldOfView(Math.PI / 2);
     for (const height of [400, 800]) {
       element.height = height;
       world.resize();
-      expect(world.project([2, 3, 1.6]).x).toBeCloseTo(1);
+      expect(world.camera.locate([2, 3, 1.6]).x).toBeCloseTo(1);
     }
   });
 
   test("a free camera looks at its target with its own field of view", () => {
-    world.setCamera({ position: [0, 0, 5], target: [0, 0, 0], fovy: Math.PI / 2 });
-    expect(world.project([0, 0, 0])).toMatchObject({ x: expect.closeTo(0.5), y: expect.closeTo(0.5) });
-    expect(world.project([0, 5, 0]).y).toBeCloseTo(0); // north is up
-    world.setEye(eye);
-    expect(world.project([1, 5, 1.6]).inView).toBe(true);
+    world.camera.setFree({ position: [0, 0, 5], target: [0, 0, 0], fovy: Math.PI / 2 });
+    expect(world.camera.locate([0, 0, 0])).toMatchObject({ x: expect.closeTo(0.5), y: expect.closeTo(0.5) });
+    expect(world.camera.locate([0, 5, 0]).y).toBeCloseTo(0); // north is up
+    world.camera.setEye(eye);
+    expect(world.camera.locate([1, 5, 1.6]).inView).toBe(true);
   });
 });
 

@@ -8,8 +8,8 @@ import { EMPTY, GAIT, SPEEDS } from "./walks.js";
 
 const world = vi.hoisted(() => ({
   load: vi.fn(async () => ({ objects: { mug: {} } })), loadModels: vi.fn(), setFieldOfView: vi.fn(), resize: vi.fn(),
-  setObjects: vi.fn(), setPose: vi.fn(), setPerson: vi.fn(), setEye: vi.fn(), setMarkers: vi.fn(), setOutline: vi.fn(),
-  draw: vi.fn(), project: vi.fn(() => ({ x: 0.25, y: 0.5, inView: true })), onLost: () => {},
+  setObjects: vi.fn(), setPose: vi.fn(), setPerson: vi.fn(), setMarkers: vi.fn(), setOutline: vi.fn(),
+  draw: vi.fn(), camera: { setEye: vi.fn(), locate: vi.fn(() => ({ x: 0.25, y: 0.5, inView: true })) }, onLost: () => {},
 }));
 vi.mock("../static/drawing/world.js", () => ({ World3D: vi.fn(function () { return world; }) }));
 
@@ -112,7 +112,7 @@ describe("a view that this browser draws", () => {
     view.draw(20);
     view.add({ number: 1, forward: 1, step: view.step });
     view.draw(39);
-    const [eye] = world.setEye.mock.lastCall ?? [];
+    const [eye] = world.camera.setEye.mock.lastCall ?? [];
     expect(eye.position[0]).toBeGreaterThan(GAIT.eye_forward);
   });
 
@@ -148,6 +148,6 @@ describe("a view that this browser draws", () => {
     view.calm = true;
     view.take(state({ body: [0, 0, 0.3, ...new Array(13).fill(0)] }), 0);
     view.draw(10);
-    expect(world.setEye.mock.lastCall?.[0].heading).toBeCloseTo(Math.PI / 8);
+    expect(world.camera.setEye.mock.lastCall?.[0].heading).toBeCloseTo(Math.PI / 8);
   });
 });

@@ -11,8 +11,8 @@ export const world = {
   onRestored: () => {},
   load: vi.fn(async (/** @type {(name: string) => string} */ resolve) => ({ objects: { mug: {} }, rooms, file: resolve("scene.json") })),
   loadModels: vi.fn(), resize: vi.fn(), setFieldOfView: vi.fn(), setObjects: vi.fn(), setPose: vi.fn(), setPerson: vi.fn(),
-  setEye: vi.fn(), setCamera: vi.fn(), setMarkers: vi.fn(), setOutline: vi.fn(), showCeilings: vi.fn(), draw: vi.fn(),
-  project: vi.fn(() => ({ x: 0.25, y: 0.5, inView: true })),
+  setMarkers: vi.fn(), setOutline: vi.fn(), showCeilings: vi.fn(), draw: vi.fn(),
+  camera: { setEye: vi.fn(), setFree: vi.fn(), locate: vi.fn(() => ({ x: 0.25, y: 0.5, inView: true })) },
   onFrame: vi.fn((/** @type {(now: number) => void} */ frame) => {
     const next = (/** @type {number} */ now) => (frame(now), requestAnimationFrame(next));
     requestAnimationFrame(next);

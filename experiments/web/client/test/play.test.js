@@ -476,7 +476,7 @@ describe("a browser that draws", () => {
     socket().receive(STATE);
     key("KeyW");
     vi.advanceTimersByTime(200);
-    expect(world.setEye.mock.lastCall?.[0].position[0]).toBeGreaterThan(0.1);
+    expect(world.camera.setEye.mock.lastCall?.[0].position[0]).toBeGreaterThan(0.1);
     expect(socket().inputs.find((input) => input.forward)).toMatchObject({ step: 0 });
     expect(socket().all("inputs").at(-1).until).toBeGreaterThanOrEqual(4);
   });

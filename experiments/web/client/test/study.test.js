@@ -95,7 +95,7 @@ describe("device check", () => {
     expect(rate).toBe(40);
     expect(await world.load.mock.results[0]?.value).toHaveProperty("file", "/scene/1/scene.json");
     expect(world.draw).toHaveBeenCalledTimes(61);
-    const places = world.setEye.mock.calls.map(([{ position }]) => position.join(" "));
+    const places = world.camera.setEye.mock.calls.map(([{ position }]) => position.join(" "));
     expect(new Set(places)).toEqual(new Set(["1 1 1.6", "5 1 1.6"]));
     expect(document.getElementById("apartment")).toBeNull();
   });

@@ -53,7 +53,7 @@ test("a run is shown from its start in first person without loading other files"
   expect(told.setObjects).toEqual([{ cup: { model: "mug", pose: [1, 1, 1, 1, 0, 0, 0] } }]);
   expect(told.setFieldOfView).toEqual([1.5]);
   later();
-  expect(world.setEye.mock.lastCall?.[0].position).toEqual([0.06, 0, 1.6]);
+  expect(world.camera.setEye.mock.lastCall?.[0].position).toEqual([0.06, 0, 1.6]);
   expect([part("progress").textContent, part("plan").textContent]).toEqual(["0 / 2 put away", "Plan: 9.0 m, optimal"]);
   expect(part("seconds").textContent).toBe("0.0 / 10.0 s");
   expect(markers()).toEqual(RUN.markers);
@@ -102,7 +102,7 @@ test("the slider and the arrow keys change the time", () => {
 test("the view from above shows the person and both paths but no ceilings", () => {
   camera("above");
   expect(world.showCeilings).toHaveBeenLastCalledWith(false);
-  expect(world.setCamera.mock.lastCall?.[0].position[2]).toBeGreaterThan(5);
+  expect(world.camera.setFree.mock.lastCall?.[0].position[2]).toBeGreaterThan(5);
   expect(document.querySelector("[data-camera=above]")?.getAttribute("aria-pressed")).toBe("true");
   const shapes = markers().map(({ shape }) => shape);
   expect(shapes).toContain("cylinder"); // the person's body
@@ -111,8 +111,8 @@ test("the view from above shows the person and both paths but no ceilings", () =
   later();
   expect(markers().length).toBeLessThan(shapes.length);
   camera("free");
-  expect(world.setCamera.mock.lastCall?.[0].fovy).toBeCloseTo((50 * Math.PI) / 180);
-  const pose = () => world.setCamera.mock.lastCall?.[0].position;
+  expect(world.camera.setFree.mock.lastCall?.[0].fovy).toBeCloseTo((50 * Math.PI) / 180);
+  const pose = () => world.camera.setFree.mock.lastCall?.[0].position;
   const [before, at] = [pose(), part("time").value];
   for (const key of ["ArrowLeft", "+"]) part("screen").dispatchEvent(new KeyboardEvent("keydown", { key, code: key }));
   later();

@@ -37,7 +37,7 @@ test("the participant's phase and view are shown, including snapshots received w
   expect(part("note").textContent).toBe("p00001");
   expect(world.setObjects.mock.lastCall).toEqual([{ cup: { model: "mug", pose: SNAPSHOT.objects.cup } }]);
   await later();
-  expect(world.setEye.mock.lastCall?.[0].position).toEqual([1.06, 2, 1.6]);
+  expect(world.camera.setEye.mock.lastCall?.[0].position).toEqual([1.06, 2, 1.6]);
 });
 
 test("the page reconnects after the connection closes, and never sends anything", async () => {

@@ -13,7 +13,6 @@ import { Things } from "./things.js";
 
 /** @import { Object3D } from "../vendor/three.js" */
 /** @import { Marker } from "../protocol.js" */
-/** @import { Eye, FreeCamera, Place, Point } from "./camera.js" */
 /** @import { Resolve, SceneFile } from "./scene_files.js" */
 /** @import { Pose, Thing } from "./things.js" */
 /**
@@ -28,12 +27,12 @@ export class World3D {
   onLost = () => {};
   /** Is called when a lost context is back. */
   onRestored = () => {};
+  camera = new HouseCamera();
 
   #canvas;
   #renderer;
   #scene = new Scene();
   #house = new Group();
-  #camera = new HouseCamera();
   #outline = new Outline();
   #person = new Group();
   #milliseconds = 0;
@@ -102,7 +101,7 @@ export class World3D {
 
   /** Compiles shaders and uploads textures now, so that turning to a part does not stutter. @template {Object3D} T @param {T} part */
   async #prepared(part) {
-    await this.#renderer.compileAsync(part, this.#camera);
+    await this.#renderer.compileAsync(part, this.camera);
     part.traverse((child) => {
       const map = /** @type {any} */ (child).material?.uniforms?.map?.value;
       if (map) this.#renderer.initTexture(map);
@@ -116,28 +115,13 @@ export class World3D {
     this.#renderer.setPixelRatio(scale * (window.devicePixelRatio || 1));
     this.#renderer.setSize(Math.max(1, width), Math.max(1, height), false);
     this.#outline.resize(Math.max(1, width), Math.max(1, height));
-    this.#camera.resize(this.#canvas.width / this.#canvas.height);
+    this.camera.resize(this.#canvas.width / this.#canvas.height);
   }
 
   /** @param {number} angle how wide the eye sees, rad, whatever the shape of the view */
   setFieldOfView(angle) {
-    this.#camera.horizontal = angle;
-    this.#camera.resize(this.#camera.aspect);
-  }
-
-  /** Looks through the person's eyes. @param {Eye} eye */
-  setEye(eye) {
-    this.#camera.setEye(eye);
-  }
-
-  /** Looks from anywhere. @param {FreeCamera} camera */
-  setCamera(camera) {
-    this.#camera.setFree(camera);
-  }
-
-  /** Where a point appears, the same value at every call. @param {Point} point @returns {Readonly<Place>} */
-  project(point) {
-    return this.#camera.locate(point);
+    this.camera.horizontal = angle;
+    this.camera.resize(this.camera.aspect);
   }
 
   /** @param {boolean} shown what hangs above the rooms, which hides them from above */
@@ -182,7 +166,7 @@ export class World3D {
   draw() {
     const start = performance.now();
     this.#things?.update();
-    this.#renderer.render(this.#scene, this.#camera);
+    this.#renderer.render(this.#scene, this.camera);
     this.#milliseconds = performance.now() - start;
   }
 
@@ -202,6 +186,6 @@ export class World3D {
 
   /** What a headset draws with. */
   get stage() {
-    return { renderer: this.#renderer, scene: this.#scene, camera: this.#camera };
+    return { renderer: this.#renderer, scene: this.#scene, camera: this.camera };
   }
 }

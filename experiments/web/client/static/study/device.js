@@ -41,7 +41,7 @@ async function apartment(canvas) {
     const draw = (share) => {
       const polygon = rooms[Math.floor(share * rooms.length)]?.polygon ?? [];
       const [x, y] = [0, 1].map((axis) => polygon.reduce((sum, point) => sum + (point[axis] ?? 0) / polygon.length, 0));
-      world.setEye({ position: [x ?? 0, y ?? 0, EYE_HEIGHT], heading: 2 * Math.PI * share * rooms.length, pitch: 0 });
+      world.camera.setEye({ position: [x ?? 0, y ?? 0, EYE_HEIGHT], heading: 2 * Math.PI * share * rooms.length, pitch: 0 });
       world.draw();
     };
     return { world, draw };

@@ -63,8 +63,8 @@ function draw() {
   world.setPerson({ x, y, heading, hands: run.hands(step, share), eyeHeight: recorded.person.eye_height });
   const eye = eyeOf([x, y, heading, pitch], recorded.person);
   if (headset.place(eye.position)) headset.show(run.hud(step), run.hud(step).clock);
-  else if (camera === "person") world.setEye(eye);
-  else world.setCamera(camera === "above" ? orbit.above() : orbit.pose());
+  else if (camera === "person") world.camera.setEye(eye);
+  else world.camera.setFree(camera === "above" ? orbit.above() : orbit.pose());
   if (step !== shown) showStep(step, x, y, heading);
   slider.value = `${time}`;
   byId("seconds", HTMLOutputElement).textContent = `${time.toFixed(1)} / ${run.duration.toFixed(1)} s`;
