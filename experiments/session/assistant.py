@@ -34,6 +34,7 @@ class Assistant:
     """An assistant that passes task states to the planner and plans to the assistance condition.
 
     Attributes:
+        board: The task list and the messages that the HUD shows.
         shown_roles: Roles of the markers that the condition shows at the start of the task.
         shows_plan: True if the condition shows the plan or its next step.
         is_custom: True if the condition is user code.
@@ -49,7 +50,7 @@ class Assistant:
         log_regrets: bool = False,
         options: WorldOptions | None = None,
     ) -> None:
-        self._board, self._house, self._episode = board, board.house, board.episode
+        self.board, self._house, self._episode = board, board.house, board.episode
         self._assistance, self._show = assistance, condition(assistance)
         self._capacity = (options or WorldOptions()).capacity
         self._planner = planner
@@ -66,7 +67,7 @@ class Assistant:
     def begin(self, observation: Observation) -> None:
         self._last_visit_at = observation.position.copy()
         self._plan(observation)
-        self.show_message("started", observation.time)
+        self.board.show_message("started", observation.time)
         state = self.hud_state(observation)
         self.shown_roles = frozenset(marker.role for marker in state.markers)
         self._rerouted = state.rerouted
@@ -82,8 +83,8 @@ class Assistant:
                 made = Visit(VISIT_KIND[event.kind], event.object)
                 self._last_visit_at = observation.position.copy()
                 self._log.visit(event.time, made, self._last_visit_at)
-                self._board.note_visit(made)
-            self.show_message(event.kind.value, observation.time, event.object)
+                self.board.note_visit(made)
+            self.board.show_message(event.kind.value, observation.time, event.object)
         if events:
             self._plan(observation)
             return
@@ -111,7 +112,7 @@ class Assistant:
         """Observe the state after a recorded control step, and the events logged during the step."""
         for event in events:
             if event["event"] == "attempt" and event["refusal"] is not None:
-                self.show_message(event["refusal"], observation.time, event["object"])
+                self.board.show_message(event["refusal"], observation.time, event["object"])
         happened = [
             WorldEvent(float(e["t"]), WORLD_EVENTS[e["event"]], e["object"], e["receptacle"])
             for e in events
@@ -120,24 +121,16 @@ class Assistant:
         self.observe(observation, happened)
         for event in events:
             if event["event"] == "scroll":
-                self.scroll(int(event["rows"]))
-
-    def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
-        """Show a message about an event or a refused action in the message bar."""
-        self._board.show_message(key, time, object_name)
-
-    def scroll(self, rows: int) -> None:
-        """Scroll the task list by a number of rows, positive towards its end."""
-        self._board.scroll(rows)
+                self.board.scroll(int(event["rows"]))
 
     def hud_state(self, observation: Observation, camera: CameraView | None = None) -> HudState:
         """Return the current HUD state.
 
         If the eye camera `camera` is given, conditions can point to a goal that is out of view.
         """
-        view = self._board.view(
+        view = self.board.view(
             observation,
-            ahead=PlanView(self._board, observation, lambda: self._planner.route, self._paths_to),
+            ahead=PlanView(self.board, observation, lambda: self._planner.route, self._paths_to),
             capacity=self._capacity,
             camera=camera,
             regrets=functools.partial(self._planner.regrets, shown=True),
@@ -188,7 +181,7 @@ class Assistant:
         )
         self._path_from = observation
         if self.shows_plan and self._planner.replans > before:
-            self._board.announce_replan(observation.time)
+            self.board.announce_replan(observation.time)
 
     def _paths_to(self, visit: Visit) -> PathsToNext:
         if self._path_from is not None:
@@ -204,7 +197,7 @@ class Assistant:
         return self._places(observation, visit)
 
     def _goal(self, observation: Observation, visit: Visit) -> NDArray[np.float64]:
-        return np.array(self._board.goal(observation, visit)[:2])
+        return np.array(self.board.goal(observation, visit)[:2])
 
     def _places(
         self, observation: Observation, visit: Visit

@@ -232,7 +232,7 @@ class Session:
     def scroll(self, rows: int) -> None:
         """Scroll the task list by a number of rows, positive towards its end, and log the event."""
         self.note("scroll", rows=rows)
-        self.assistant.scroll(rows)
+        self.assistant.board.scroll(rows)
         self._hud = None
 
     def _log_end(self, time: float, reason: str, **details: str) -> None:
@@ -268,7 +268,7 @@ class Session:
 
     def _record_end(self, reason: str) -> None:
         if reason == ALL_DELIVERED:
-            self.assistant.show_message("finished", self._now.time)
+            self.assistant.board.show_message("finished", self._now.time)
         self.record.append(self._now, self._world.health_sample, self._world.state_hash(), Steps(IDLE))
         end = self._now
         while reason == ALL_DELIVERED and self._viewer is not None and self._now.time < end.time + FINAL_HOLD:
@@ -290,7 +290,7 @@ class Session:
             time, "attempt", action=kind, object=result.object, applied=result.applied, refusal=refusal
         )
         if refusal is not None:
-            self.assistant.show_message(refusal, time, result.object)
+            self.assistant.board.show_message(refusal, time, result.object)
 
     def _hud_state(self) -> HudState:
         if self._hud is None or self._hud[0] is not self._now:
