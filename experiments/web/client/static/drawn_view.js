@@ -56,7 +56,11 @@ export class DrawnView {
   /** Preloads a house. `load` reports any error later. @param {string} path */
   prepare(path) {
     const before = this.#house.loaded.catch(() => {});
-    this.#house = { path, loaded: before.then(() => this.#loadHouse(path)) };
+    const load = async () => {
+      const { objects } = await this.world.load((name) => path + name);
+      this.world.loadModels(Object.keys(objects)); // ahead of the moment when they come into view
+    };
+    this.#house = { path, loaded: before.then(load) };
     this.#house.loaded.catch(() => {});
   }
 
@@ -72,12 +76,6 @@ export class DrawnView {
     this.#walker = floor && new Walker(message.gait, await floor.json());
     this.world.setFieldOfView(message.field_of_view);
     this.#scene = message;
-  }
-
-  /** @param {string} path */
-  async #loadHouse(path) {
-    const { objects } = await this.world.load((name) => path + name);
-    this.world.loadModels(Object.keys(objects)); // ahead of the moment when they come into view
   }
 
   /** Starts the clock. @param {number} now ms */

@@ -23,19 +23,11 @@ export class Panel {
     dialog.addEventListener("cancel", (event) => event.preventDefault());
   }
 
-  get open() {
-    return this.#dialog.open;
-  }
-
-  get title() {
-    return within(this.#dialog, "h2", HTMLElement).textContent;
-  }
-
   /** @param {Dialog} dialog */
   show(dialog) {
     const { title, texts, pictures = [], markers, keys = [], buttons = [] } = dialog;
     const described = JSON.stringify(dialog);
-    if (described === this.#shown && this.open) return; // a button keeps its focus
+    if (described === this.#shown && this.#dialog.open) return; // a button keeps its focus
     this.#shown = described;
     within(this.#dialog, "h2", HTMLElement).textContent = title;
     const content = [...texts.map((text) => made("p", text)), ...example(pictures), ...explained(markers), ...keyCaps(keys)];

@@ -57,7 +57,7 @@ describe("dialogs", () => {
     const closed = vi.fn();
     const panel = new Panel(dialog, { run }, closed);
     panel.show(of("paused", { reason: "asked" }));
-    expect([panel.open, panel.title, document.activeElement?.textContent]).toEqual([true, "Paused", "Continue"]);
+    expect([dialog.open, dialog.querySelector("h2")?.textContent, document.activeElement?.textContent]).toEqual([true, "Paused", "Continue"]);
     dialog.querySelector("button")?.click();
     expect(run).toHaveBeenCalledOnce();
     panel.hide();
