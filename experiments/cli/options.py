@@ -13,6 +13,7 @@ from experiments.errors import CALL_LIMIT, ConfigError
 from experiments.participants.distribution import Distributions
 from experiments.participants.registry import participant_names
 from experiments.session.film_config import FRAME_SIZE, FilmConfig
+from experiments.trials.attributes import attributes
 from experiments.trials.design import numbers
 from experiments.trials.trial_config import DEFAULTS, DRAWN_BY, SEEDS, SETTINGS, TrialConfig, episode_settings
 from hud.conditions import CONDITIONS, OPTIONS
@@ -35,7 +36,7 @@ TRIAL_OPTIONS = tuple(
     for name in SETTINGS
     if name not in ("objects", "assistance", "user", "live", "behaviour", "trial_number", *PAGE_SETTINGS)
 )
-_TYPES = typing.get_type_hints(TrialConfig)
+_TYPES, _DESCRIPTIONS = typing.get_type_hints(TrialConfig), attributes(TrialConfig)
 _CHOICES: dict[str, tuple[Any, ...]] = {"fidelity": FIDELITIES, "capacity": CAPACITIES, "draw": DRAWN_BY}
 _METAVARS = {  # values that are neither a number N nor a NAME
     **dict.fromkeys(("time_limit", *SEEDS), "S"),
@@ -135,7 +136,7 @@ class _CallLimit(argparse.Action):
 
 def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> None:
     """Add an option for a setting of `TrialConfig`. It defaults to None unless `changes` has a default."""
-    text = f"{SETTINGS[name].replace('`', '').rstrip('.')}{NAMES.get(name, str)()}"
+    text = f"{_DESCRIPTIONS.get(name, name).replace('`', '').rstrip('.')}{NAMES.get(name, str)()}"
     if name in SEEDS:
         text += " (default: the value of --seed)"
     named = isinstance(DEFAULTS[name], str | int) and _TYPES[name] is not bool and "(default" not in text

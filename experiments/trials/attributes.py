@@ -25,8 +25,8 @@ def described(kind: type[Any], leave_out: set[str] | frozenset[str] = frozenset(
 
 
 def attributes(kind: type[Any]) -> dict[str, str]:
-    """Return the description of each field in the section `Attributes` of a docstring."""
-    text = (inspect.getdoc(kind) or "").split("Attributes:\n", 1)[1]
+    """Return the description of each field in the docstring of a class. Python with -OO has no docstrings."""
+    text = (inspect.getdoc(kind) or "").partition("Attributes:\n")[2]
     text = re.split(r"\n\n?(?=\S)", text)[0]
     entries = re.split(r"\n(?=    \w+(?:, \w+)*: )", "\n" + text)[1:]
     pairs = (entry.strip().split(": ", 1) for entry in entries)

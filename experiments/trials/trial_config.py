@@ -11,7 +11,6 @@ from experiments.errors import ConfigError
 from experiments.participants.distribution import Distributions
 from experiments.participants.registry import DEFAULT_PARTICIPANT
 from experiments.record.phases import STORY, TASK, TRAINING, phases_of
-from experiments.trials.attributes import attributes
 from experiments.trials.person import check_person, view_limits
 from mjsim.house.catalogue.house_ref import parse_house
 from mjsim.values.episode import CAPACITY, POINTS, Episode
@@ -175,8 +174,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         }
 
 
-# The description of each recorded setting
-SETTINGS = {name: about for name, about in attributes(TrialConfig).items() if name != "seed"}
+SETTINGS = tuple(name for name in TrialConfig.__struct_fields__ if name != "seed")  # those that are recorded
 DEFAULTS: dict[str, Any] = {f.name: f.default for f in msgspec.structs.fields(TrialConfig)}
 PATHS = ("house", "episode", "story")
 # Settings that may accidentally differ between the conditions that are compared
