@@ -13,7 +13,8 @@ from planner.errors import NavMeshError, NotNavigableError
 from planner.navmesh import TOLERANCE, NavMesh
 
 RADIUS = 0.25
-coordinate = st.floats(0.0, 4.0, allow_nan=False)
+# GEOS decides wrongly about points next to subnormal coordinates.
+coordinate = st.floats(0.0, 4.0, allow_subnormal=False)
 triangles = st.lists(st.tuples(coordinate, coordinate), min_size=3, max_size=5)
 fields = st.lists(triangles, max_size=5)
 BOUNDS = (0.0, 0.0, 4.0, 4.0)
