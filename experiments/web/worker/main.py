@@ -66,7 +66,7 @@ class Worker:
         os._exit(0)
 
     def _take(self, message: WireMessage) -> None:
-        # The server itself can also send these messages
+        # The server itself can also send these messages.
         if not isinstance(message, protocol.Open | protocol.Pause):
             self._control.hear()
         match message:
