@@ -1,13 +1,13 @@
 """Decorate rooms with pictures, curtains, lamps, rugs and radiators."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from mjsim.generator.furniture.appearance import Appearance
 from mjsim.generator.furniture.catalogue import KINDS
-from mjsim.generator.furniture.piece import Piece, Point, flattened, moved, moved_point, overlap
+from mjsim.generator.furniture.piece import Piece, Point, Spot, flattened, moved, moved_point, overlap
 from mjsim.generator.openings import gaps
 from mjsim.generator.poses import WALL_GAP
 from mjsim.generator.space import BLINDS, PiecePose, Space, footprint
@@ -51,7 +51,10 @@ def decorate(
             space = next(s for s in spaces if s.room.key == door.rooms[0])
             mat = KINDS["door_mat"].make(stream(seed, "door_mat"), look)
             x, y = space.room.floor.along(door.side, door.center, door.center, 0.15, 0.15).center
-            space.record(mat, PiecePose(x, y, BACK[door.side], door.side, door.center))
+            place = PiecePose(x, y, BACK[door.side], door.side, door.center)
+            # A mat on the rug of a living room would flicker.
+            if not any(overlap(footprint(mat, place), spot) for spot in _rugs(space)):
+                space.record(mat, place)
     for space in spaces:
         key, use = space.room.key, uses[space.room.key]
         for window in plan.windows_of(key):
@@ -61,6 +64,13 @@ def decorate(
         _hang_lamps(space, look, stream(seed, "lamp", key))
         _lay_rug(space, use, look, stream(seed, "rug", key))
         _hang_on_walls(space, use, look, stream(seed, "wall", key))
+
+
+def _rugs(space: Space) -> Iterator[Spot]:
+    for piece, place in space.stood:
+        for member, *pose in flattened(piece, place.x, place.y, place.yaw):
+            if member.kind == "rug":
+                yield moved((-member.size[0] / 2, 0, member.size[0] / 2, member.size[1]), *pose)
 
 
 def _at_wall(space: Space, side: Side, along: float) -> PiecePose:
@@ -126,8 +136,7 @@ def _hang_lamps(space: Space, look: Appearance, rng: np.random.Generator) -> Non
 
 
 def _lay_rug(space: Space, use: str, look: Appearance, rng: np.random.Generator) -> None:
-    lies = any(p.kind == "rug" for piece, _ in space.stood for p, *_ in flattened(piece))
-    if use not in _RUGS or lies or (rng.random() > 0.85 and space.room.floor.area < LARGE):
+    if use not in _RUGS or any(_rugs(space)) or (rng.random() > 0.85 and space.room.floor.area < LARGE):
         return
     kinds = _RUGS[use]
     kind = kinds[int(rng.integers(len(kinds)))] if space.room.floor.area < LARGE else kinds[0]

@@ -33,6 +33,11 @@ def test_another_process_makes_the_same_bytes() -> None:
     assert here == there[::-1]
 
 
+def test_a_door_mat_is_not_on_the_rug_of_a_living_room() -> None:
+    report = check_path("generated:872047?rooms=3", load=load_catalogue)
+    assert report.facts["drawn overlaps"] == report.facts["flickering faces"] == "none"
+
+
 @pytest.mark.parametrize("rooms", [1, 3, 6])
 def test_a_house_can_be_used_and_holds_as_many_objects_as_it_says(rooms: int) -> None:
     report = check_path(f"generated:11?rooms={rooms}", load=load_catalogue)
