@@ -79,7 +79,7 @@ class House:
 
     @classmethod
     def of(cls, catalogue: Catalogue) -> "House":
-        """Prepare the house of a catalogue for trials. Raise an AssetError if trials are impossible in it."""
+        """Prepare the house of a catalogue for trials. Raise an AssetError if the house cannot be used for trials."""
         house = compiled_house(catalogue)
         require_usable(house)
         floor = house.floor

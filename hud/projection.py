@@ -79,7 +79,7 @@ def in_view(camera: CameraView, point: Vec3, margin: float = 0.0) -> bool:
 
 
 def pointer_to(camera: CameraView, target: Vec3, margin: float = 0.02) -> Pointer | None:
-    """Return a pointer to a target, or None if the target is in view.
+    """Return the pointer that shows the way to a target, or None because a target in view needs no pointer.
 
     A target is in view if it is at least `margin` times the image height from the edge of the image.
     """

@@ -23,7 +23,9 @@ from planner.plan import Certificate
 from planner.problem import RoutingProblem
 
 MAX_SUM = 1 << 62  # maximum sum of lengths and multipliers, so that no sum overflows
-EXACT = 1e-15  # error of distances that count as multiples of the unit, relative to the largest distance
+# Largest rounding error of a distance, relative to the largest distance. With a smaller error, the distance counts as a
+# multiple of the unit.
+EXACT = 1e-15
 
 Whole = NDArray[np.int64]
 # First node, last node, length in units, maximum number of uses in a tour, and object that is picked up or -1

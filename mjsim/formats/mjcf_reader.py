@@ -100,7 +100,7 @@ def _without_missing_meshes(spec: mujoco.MjSpec, path: Path, missing: MissingFil
 
 
 def _take_pictures(spec: mujoco.MjSpec) -> tuple[dict[str, _Picture], list[str]]:
-    """Remove all textures from a model. Return them by material name, and the names of missing files."""
+    """Remove all textures from a model. Return the textures by material name, and a list of missing files."""
     files = {t.name: t.file for t in spec.textures if t.file}  # cube textures are shown on every side
     made = {t.name: t.rgb1 for t in spec.textures if not t.file}
     images: dict[str, Floats] = {}

@@ -19,7 +19,7 @@ class Start(NamedTuple):
     """A warm start in which objects are identified by their indices in an instance."""
 
     group: NDArray[np.int64]  # group of each object, numbered from 0, shape (n,)
-    multipliers: NDArray[np.int64]  # price of picking up each object in units, shape (n,)
+    multipliers: NDArray[np.int64]  # price in units for picking up each object, shape (n,)
     order: list[int]  # indices of known objects, in the order in which a good tour picks them up
 
 

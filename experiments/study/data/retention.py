@@ -77,7 +77,7 @@ async def forget_daily(store: Store, visits: Path, keep_days: int) -> NoReturn:
 
 
 async def _names(store: Store, people: Sequence[PersonRow]) -> dict[int, str]:
-    """Choose new names for the run folders, because a hash of a link still identifies the participant."""
+    """Choose new names for the run folders. The old names are hashes of links, which identify participants."""
     study = await store.study()
     made = {p.id: f"{study.name} {study.created} {p.id}" for p in people}
     return {number: hashlib.sha256(text.encode()).hexdigest() for number, text in made.items()}

@@ -64,7 +64,7 @@ class WorkerProcess:
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def end(self) -> None:
-        """Terminate the process and wait for it. All acknowledged inputs are in the journal."""
+        """Terminate the process and wait for it. No input is lost, because acknowledged inputs are in the journal."""
         self._process.terminate()
         self._process.join(END_TIMEOUT)
         self._process.kill()

@@ -44,7 +44,7 @@ class BrowserViewer(Viewer):
         self._step = -1  # control step of the last snapshot
         self._looked = -HUD_EVERY  # control step of the last HUD update
         self._glance: object = None  # state at the last HUD update
-        self._noticed: set[str] = set()  # objects that have been in the picture
+        self._noticed: set[str] = set()  # objects that the participant has seen so far
 
     def set_view(self, view: View | None) -> None:
         """Send the complete state to a new connection. If `view` is None, keep the previous view."""

@@ -133,7 +133,7 @@ class _HabitatReader:
         return tuple(found.values())
 
     def instance(self, item: dict[str, Any], kind: str) -> Iterator[ScenePiece]:
-        """Yield the pieces of a stage or object in its pose, converted to z up."""
+        """Yield the pieces of a stage or an object. Their poses are those in the scene, with z up."""
         name = str(item.get("template_name", "")).rpartition("/")[2]
         config_file = self._files.get(f"{name}.{kind}_config.json")
         config = _read(config_file) if config_file else {}

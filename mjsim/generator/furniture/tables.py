@@ -88,7 +88,8 @@ def dining(b: Builder) -> Piece:
     base = b.draw(kind, b.smaller)
     w, d, _ = base.size
     chair = _seat(b, seats.dining_chair)
-    edges = []  # middle of each seat's table edge, and the direction in which a person sits there
+    # For each seat, the middle of its edge of the table, and the yaw of a person who sits there
+    edges = []
     each = 2 if w >= 1.15 and b.smaller < 2 and kind is table else 1
     for i in range(each):
         x = (i + 0.5) * w / each - w / 2

@@ -123,7 +123,9 @@ def _move(spec: mujoco.MjSpec, geoms: list[Any], frame: Any, body: Any) -> None:
     names = [geom.name for geom in geoms]
     before = len(body.geoms)
     for geom in geoms:
-        geom.name = ""  # Attaching a frame first copies its geoms, whose names must be unique.
+        geom.name = (
+            ""  # Attaching a frame copies its geoms, and the copies must not have names that are in use.
+        )
         geom.set_frame(frame)
     body.attach_frame(frame, "", "")
     spec.delete(frame)

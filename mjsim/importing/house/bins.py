@@ -193,7 +193,7 @@ def _origin(grid: FloorGrid, base: Floats, choice: _Choice) -> tuple[float, floa
 
 
 def _count(mask: Mask, spans: Sequence[Span]) -> NDArray[np.int_]:
-    """Count the cells of `mask` in a rectangle near each cell. The two spans are relative to the cell."""
+    """For each cell, count the cells of `mask` in a rectangle. The spans are the rectangle relative to the cell."""
     total = np.pad(np.cumsum(np.cumsum(mask, axis=0), axis=1), ((1, 0), (1, 0)))
     (a, b), (c, d) = (
         [np.clip(np.arange(side) + end, 0, side) for end in span]

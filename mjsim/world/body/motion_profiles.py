@@ -71,7 +71,7 @@ def change_turn_rate(command: Command, rate: float, max_rate: float, max_change:
 def change_pitch(
     command: Command, rate: float, max_rate: float, lowest: float, highest: float, seconds: float
 ) -> None:
-    """Change the commanded pitch at `rate` (rad/s), within the limits of the rate and of the pitch (rad)."""
+    """Change the commanded pitch (rad) at `rate` (rad/s). Both the rate and the pitch are limited."""
     rate = min(max_rate, max(-max_rate, rate))
     if rate != 0.0:
         command[LOOK] = min(highest, max(lowest, command[LOOK] + rate * seconds))

@@ -117,7 +117,7 @@ def command(
 
 @kernel
 def brake(body: NDArray[np.float64], turn: float, gait: Gait) -> None:
-    """Change the commanded velocity towards 0 and the commanded yaw rate towards `turn` (rad/s)."""
+    """Reduce the commanded velocity, and bring the commanded yaw rate closer to `turn` (rad/s)."""
     motion = body[FORWARD:SERVO]
     motion_profiles.change_velocity(motion, 0.0, 0.0, gait.max_speed, gait.acceleration * gait.dt)
     motion_profiles.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)

@@ -60,7 +60,7 @@ class Obstacles(NamedTuple):
 
 
 class Walk(NamedTuple):
-    """The data of a `FollowPath` action in a form for kernels, with the person's pace and the obstacles."""
+    """Arguments of the kernels that follow a path: the `FollowPath` action, the person's pace and the obstacles."""
 
     path: Floats
     goal: tuple[float, float]
