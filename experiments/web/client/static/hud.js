@@ -1,6 +1,6 @@
 // The heads-up display: lists next to the view, and elements on top of it.
 
-/** @import { ChecklistItem, HudState, InventorySlot, Moment, Pictures, Reach } from "./protocol.js" */
+/** @import { BinEntry, ChecklistItem, HudState, InventorySlot, Moment, Pictures, Reach } from "./protocol.js" */
 
 import { byId, made } from "./dom.js";
 import { drawMap } from "./map.js";
@@ -53,7 +53,7 @@ export class Hud {
     this.#state = state;
     byId("list-title", HTMLElement).textContent = `${state.checklist_title}: ${countText(state.checklist)}`;
     byId("list", HTMLElement).replaceChildren(...state.checklist.map((item) => this.#row(item)));
-    byId("bins", HTMLElement).replaceChildren(...state.bins.map(({ label, place, picture }) => this.#listed(picture, [made("b", label), made("small", place.replace("\n", " "))])));
+    byId("bins", HTMLElement).replaceChildren(...state.bins.map((bin) => this.#bin(bin)));
     byId("hands", HTMLElement).replaceChildren(...this.#hands(state.inventory));
     byId("progress", HTMLElement).textContent = textOf("progress", { count: state.delivered, all: state.total });
     const text = state.message ? `${SYMBOLS[state.message.kind]} ${state.message.text}` : "";
@@ -136,6 +136,11 @@ export class Hud {
     row.className = item.carried ? "carried" : item.done ? "done" : "";
     if (item.current) row.setAttribute("aria-current", "step");
     return row;
+  }
+
+  /** @param {BinEntry} bin */
+  #bin(bin) {
+    return this.#listed(bin.picture, [made("b", bin.label), made("small", bin.place.replace("\n", " "))]);
   }
 
   /** @param {(InventorySlot | null)[]} slots */
