@@ -120,6 +120,7 @@ class FormPhase:
         return {}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+        """Validate a submitted form. Return its values, or the reason why the form is refused."""
         form = self._form(sent, visitor.answers)
         if not form.validate():
             return Again(self._plan.texts["common"]["faults"], {"form": form})
