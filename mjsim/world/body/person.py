@@ -16,8 +16,8 @@ from mjsim.values.actions import Move
 from mjsim.values.motion_parameters import MotionParameters
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
-from mjsim.world.body.falls import FallDetector
 from mjsim.world.body.grips import Grips
+from mjsim.world.body.impacts import ImpactDetector
 from mjsim.world.body.load_room import carry_clearance
 from mjsim.world.body.motion_profiles import change_pitch, change_turn_rate, change_velocity, point_between
 from mjsim.world.body.postures import move_hand, posture_pace
@@ -49,13 +49,13 @@ class Person:
     moving_hand: int | None = None  # index of the hand with a motion, or None
     receptacle_heights: ReceptacleHeights = field(init=False)
     clearance: ClearanceField = field(init=False)  # clearance at the heights of carried objects
-    fall_detector: FallDetector = field(init=False)
+    impact_detector: ImpactDetector = field(init=False)
     posture_pace: NDArray[np.float64] = field(init=False)  # see `Hands.pace` in `mjsim.world.body.postures`
 
     def __post_init__(self) -> None:
         self.receptacle_heights = ReceptacleHeights(self.scene)
         self.clearance = carry_clearance(self.scene)
-        self.fall_detector = FallDetector(self.scene, self.data, self.clearance, self.dt)
+        self.impact_detector = ImpactDetector(self.scene, self.data, self.clearance, self.dt)
         self.posture_pace = posture_pace(self.motion)
 
     @property
@@ -83,7 +83,7 @@ class Person:
 
     def advance(self) -> None:
         """Simulate one control step, with shorter physics steps while an object is fast or strained."""
-        is_fast = self.fall_detector.detects(self.grips.gripped)
+        is_fast = self.impact_detector.detects(self.grips.gripped)
         self.rig.advance(
             DIVISION if is_fast or any(map(self.is_strained, (avatar.LEFT, avatar.RIGHT))) else 1
         )

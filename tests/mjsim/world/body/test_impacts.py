@@ -1,4 +1,4 @@
-"""Falls: an object that falls from a hand does not sink into the floor, and its fall is the same each time."""
+"""Impacts: falling objects do not sink into the floor, and loads that may hit something fast are detected."""
 
 from contextlib import contextmanager
 
@@ -9,7 +9,7 @@ from small_worlds import scene_of, world_of
 
 from mjsim.house.compiled.footprint import ClearanceField
 from mjsim.values.actions import IDLE
-from mjsim.world.body.falls import FallDetector
+from mjsim.world.body.impacts import ImpactDetector
 
 MODELS = ("jeans", "magazine", "t_shirt", "bottle", "plate", "towel", "newspaper", "comics")
 HEIGHT = 1.3  # of the carrying posture, m
@@ -67,7 +67,7 @@ def two_objects(catalogue, navmesh):
 
 
 def detector_of(world, clearance):
-    return FallDetector(world.scene, world.data, clearance, CONTROL_TIMESTEP)
+    return ImpactDetector(world.scene, world.data, clearance, CONTROL_TIMESTEP)
 
 
 def radius_of(world, item):

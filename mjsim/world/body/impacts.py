@@ -1,7 +1,8 @@
-"""A detector of fast objects, for which physics steps are shortened.
+"""A detector of objects that may hit something fast, for which physics steps are shortened.
 
 In one physics step of 4 ms, an object that has fallen from a hand moves by 2 cm, so it would sink that far into the
-floor before MuJoCo detects a contact. The same holds for a load that swings around a hand towards furniture.
+floor before MuJoCo detects a contact. The same holds for a load that swings around a hand towards furniture, and for
+two loads that meet.
 """
 
 import math
@@ -26,8 +27,8 @@ MARGIN = 0.03
 Floats = NDArray[np.float64]
 
 
-class FallDetector:
-    """A detector of falling or tumbling objects, and of carried objects that are about to hit something."""
+class ImpactDetector:
+    """A detector of falling or tumbling objects, and of carried objects that may hit something fast."""
 
     def __init__(self, scene: Scene, data: mujoco.MjData, clearance: ClearanceField, dt: float) -> None:
         model, index = scene.model, scene.index
@@ -39,7 +40,7 @@ class FallDetector:
         self._surroundings = (tuple(clearance), dt)
 
     def detects(self, gripped: tuple[int, ...]) -> bool:
-        """Return True if a `gripped` object may soon hit furniture or another one, or a loose object falls fast."""
+        """Return True if a loose object falls fast, or a `gripped` object may soon hit furniture or the other one."""
         first, second = (*gripped, -1, -1)[:2]
         return bool(_detects(self._arrays, self._surroundings, first, second))
 
