@@ -99,7 +99,7 @@ def check_batch_folder(path: Path) -> None:
 
 
 def check_file(path: Path | None, *, replace: bool = False) -> None:
-    """Check that a file may be written to a path, if there is one.
+    """Check that a file may be written to `path`. None, for an option that was not given, is accepted.
 
     Raises:
         RecordError: `path` exists and cannot be replaced.

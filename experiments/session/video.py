@@ -100,7 +100,7 @@ class VideoWriter:
 
 
 def check_film(path: Path | None) -> None:
-    """Raise ConfigError if a file is given, but missing or no MP4 video."""
+    """Raise ConfigError if a file is missing or is not an MP4 video. None, for no film, is accepted."""
     if path is None:
         return
     fault = "is not an MP4 video" if path.is_file() else "does not exist"

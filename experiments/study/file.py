@@ -170,7 +170,7 @@ def read_people_study(path: Path) -> Study:
     Raises:
         ConfigError: The file is missing or invalid. The message names the file, the line and the value.
     """
-    of_cells: list[Sequence[TrialConfig]] = []  # trials of each table [[cells]]
+    of_cells: list[Sequence[TrialConfig]] = []  # trials of each `[[cells]]` table
     design, file = read_design(path, of_cells.append), TomlFile.read(path, "study")
     table = file.content.get("study")
     if table is None:
