@@ -7,6 +7,7 @@ several per cent longer.
 from dataclasses import dataclass, field
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from planner.errors import UnreachableError
@@ -92,11 +93,12 @@ class Geodesics:
 
     def _locate(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         array = np.array(points, dtype=np.float64).reshape(-1, 2)
-        islands = np.zeros(len(array), dtype=np.int64)
-        for k, point in enumerate(array):
-            islands[k] = self.navmesh.island_of(point) or 0
-            # Also snap points that are only within the tolerance, because they may be inside an obstacle.
-            array[k] = self.navmesh.snap(point, self.max_snap, int(islands[k]))
+        islands = np.maximum(self.navmesh.islands_at(array), 0).astype(np.int64)
+        # Also snap points that are only within the tolerance, because they may be inside an obstacle.
+        island = np.array(self.navmesh.islands)[islands]
+        inside = shapely.intersects_xy(island, array[:, 0], array[:, 1])
+        for k in np.flatnonzero(~inside).tolist():
+            array[k] = self.navmesh.snap(array[k], self.max_snap, int(islands[k]))
         return array, islands
 
     def _query(self, points: NDArray[np.float64], islands: NDArray[np.int64]) -> _Query:

@@ -106,13 +106,20 @@ class NavMesh:
         The array is read-only and has the shape (rows, columns). Row 0 has the smallest y, so draw the map with the
         origin at the lower left. `cell_centres` contains all centres.
         """
-        islands = _islands_at(self._outer, self.cell_centres)
+        islands = self.islands_at(self.cell_centres)
         islands.setflags(write=False)
         return islands
 
+    def islands_at(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Return the island index at points (..., 2) in metres, and -1 for points outside all islands."""
+        found = np.full(points.shape[:-1], BLOCKED, dtype=np.int32)
+        for index in reversed(range(len(self._outer))):
+            found[shapely.intersects_xy(self._outer[index], points[..., 0], points[..., 1])] = index
+        return found
+
     def island_of(self, point: ArrayLike) -> int | None:
         """Return the index of the island that contains a point (x, y) in metres, or None if not navigable."""
-        island = int(_islands_at(self._outer, np.array(_point(point))))
+        island = int(self.islands_at(np.array(_point(point))))
         return None if island == BLOCKED else island
 
     def is_navigable(self, point: ArrayLike) -> bool:
@@ -172,13 +179,6 @@ def _islands(free: shapely.Geometry) -> tuple[NDArray[np.object_], NDArray[np.ob
     inner = shapely.buffer(islands, -SNAP_CLEARANCE, join_style="mitre")
     kept = shapely.area(inner) > 0
     return islands[kept], inner[kept]
-
-
-def _islands_at(outer: NDArray[np.object_], points: NDArray[np.float64]) -> NDArray[np.int32]:
-    found = np.full(points.shape[:-1], BLOCKED, dtype=np.int32)
-    for index in reversed(range(len(outer))):
-        found[shapely.intersects_xy(outer[index], points[..., 0], points[..., 1])] = index
-    return found
 
 
 def _outline(polygons: NDArray[np.object_]) -> NDArray[np.float64]:

@@ -69,7 +69,7 @@ class RegretEvaluator:
         self._limit, self._radius = limit, radius
         self._search = search or TaskSearch(self._solver, limit)
         self._last: tuple[TaskState, dict[Visit, Regret]] | None = None
-        # Last problem of `bounds`, and the plan for it
+        # Problem of the last state, and the plan for it
         self._planned: tuple[RoutingProblem, Plan] | None = None
 
     def copy(self) -> "RegretEvaluator":
@@ -140,7 +140,7 @@ class RegretEvaluator:
         if before.visits[0] == visit:
             cost, lower, proven = before.cost, before.lower_bound, before.status is Status.OPTIMAL
         else:
-            rest = self._solve(after(problem, visit))
+            rest = self._solve(after(problem, visit), self._planned)
             cost, lower = leg + rest.cost, leg + rest.lower_bound
             proven = before.status is rest.status is Status.OPTIMAL
         exact = max(0.0, cost - before.cost)
@@ -155,13 +155,13 @@ class RegretEvaluator:
             if plan is not None and is_for(plan, problem):
                 self._search.learn(problem, plan)
             else:
-                plan = self._solve(problem)
+                plan = self._solve(problem, self._planned)
             self._planned = problem, plan
         return self._planned[1]
 
-    def _solve(self, problem: RoutingProblem) -> Plan:
+    def _solve(self, problem: RoutingProblem, before: tuple[RoutingProblem, Plan] | None) -> Plan:
         if self._solver.applies(problem):
-            return self._search.plan(problem, limit=self._limit)
+            return self._search.plan(problem, limit=self._limit, before=before)
         return self._solver.solve(problem, limit=self._limit)
 
 

@@ -20,7 +20,6 @@ from planner.task_problems import TaskProblems
 MOVED = 0.3  # displacement of an object beyond which a new plan is made, in metres
 TIE = 0.01  # difference in length below which two tours count as equal, in metres
 PROOF_LIMIT = SolveLimit(seconds=20.0)
-CUTS_LIMIT = SolveLimit(work=700_000)  # allows about four nodes in a first plan by branch and cut
 
 
 @dataclass(eq=False)
@@ -64,9 +63,8 @@ class SolverSource(PlanSource):
 
     With the exact planner, plans that the participant does not see reuse earlier results. These are the full
     table if it is small enough, or else the multipliers of the lower bound. All searches after the first one
-    share a budget of states. With more than 24 objects, the first plan has a smaller limit than other plans of
-    the solver, and all later plans anneal the rest of the last one. The same sequence of states always gives the
-    same plans.
+    share a budget of states. If the task began with more than 24 objects, this also applies to the first plan and
+    to plans that the participant sees. The same sequence of states always gives the same plans.
 
     If `start` is set, `plan` returns a first plan within about 50 ms and starts a background search for a
     better one, which takes up to 20 s by default. The search reuses the multipliers of earlier bounds and the
@@ -157,12 +155,10 @@ class SolverSource(PlanSource):
         plan = None if shown else self._table.plan(problem)
         if plan is not None:
             return plan
-        reused = self._unseen.continues(problem) if shown else self._unseen.applies(problem)
-        if self._planned and reused:
-            return self._unseen.plan(problem, seed=self._seed)
-        limit = self._limit or (CUTS_LIMIT if self._unseen.by_cuts(problem) else None)
-        plan = self._solver.solve(problem, seed=self._seed, limit=limit)
-        if reused or not shown:
+        if self._unseen.continues(problem) or (not shown and self._planned and self._unseen.applies(problem)):
+            return self._unseen.plan(problem, seed=self._seed, limit=self._limit)
+        plan = self._solver.solve(problem, seed=self._seed, limit=self._limit)
+        if not shown:
             self._unseen.learn(problem, plan)
         return plan
 

@@ -16,6 +16,7 @@ from planner.solvers import SolveLimit, solver
 from planner.task_problems import TaskProblems
 
 SEARCH = ExactSolver(table_bytes=0)
+MANY = ExactSolver(table_bytes=0, most_searched=0)  # treats every problem as if it had more than 24 objects
 
 
 @pytest.fixture(scope="module")
@@ -117,12 +118,18 @@ def test_nothing_left_is_nothing_to_judge(geodesics):
 
 @pytest.mark.slow
 @settings(max_examples=15, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1), work=st.sampled_from([1, 3_000, 100_000]))
-def test_bounds_hold_for_every_budget_and_wherever_the_person_stands(geodesics, seed, work):
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    work=st.sampled_from([1, 3_000, 100_000]),
+    planner=st.sampled_from([SEARCH, MANY]),
+)
+def test_bounds_hold_for_every_budget_and_wherever_the_person_stands(geodesics, seed, work, planner):
     task, rng = Task(geodesics, 11, seed), np.random.default_rng(seed)
     exact = RegretEvaluator(geodesics)
-    search = RegretEvaluator(geodesics, solver=SEARCH, limit=SolveLimit(work=work))
+    search = RegretEvaluator(geodesics, solver=planner, limit=SolveLimit(work=work))
     while possible(task):
+        if rng.random() < 0.1:
+            task.misfortune()
         state = task.state
         best = list(exact.all(state))
         stop = best[0] if rng.random() < 0.5 else best[int(rng.integers(len(best)))]
@@ -133,6 +140,20 @@ def test_bounds_hold_for_every_budget_and_wherever_the_person_stands(geodesics, 
         if rng.random() < 0.5:  # people reach for objects from a distance
             x, y = geodesics.navmesh.snap(np.array(task.position) + rng.normal(0.0, 0.5, 2), math.inf)
             task.position = float(x), float(y)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_followed_plan_keeps_its_bound_without_a_search(geodesics, seed, monkeypatch):
+    task, evaluator = Task(geodesics, 11, seed), RegretEvaluator(geodesics, solver=MANY)
+    plan = MANY.solve(TaskProblems(geodesics).problem(task.state), limit=SolveLimit(work=250_000))
+    gap = plan.cost - plan.lower_bound
+    for k, visit in enumerate(plan.visits[:12]):
+        found = evaluator.bounds(task.state, visit, plan)
+        assert found.lower == 0.0
+        assert found.upper <= gap + 0.01
+        if k == 0:  # later plans are the rest of the first one
+            monkeypatch.setattr("planner.exact.search.improving_tours", None)
+        task.do(*visit)
 
 
 def test_all_searches_of_a_task_share_one_budget(geodesics):

@@ -4,9 +4,10 @@ import pytest
 from planning_cases import Task, two_rooms
 
 from planner.checker import check
-from planner.exact.cuts import branch_and_cut
 from planner.exact.solver import ExactSolver
+from planner.exact.task_search import TASK_WORK, TaskSearch
 from planner.plan import Status
+from planner.problem import possible_next
 from planner.solver_source import SolverSource
 from planner.task_problems import TaskProblems
 
@@ -54,11 +55,19 @@ def test_a_table_is_filled_once_while_nothing_is_moved(geodesics, monkeypatch):
     assert len(filled) == 2
 
 
-def test_a_first_plan_by_branch_and_cut_may_search_fewer_nodes_than_the_planner_alone(geodesics, monkeypatch):
-    nodes = []
-    monkeypatch.setattr(branch_and_cut, "integer_flow", lambda model, most, deadline: nodes.append(most))  # noqa: ARG005
-    task, planner = Task(geodesics, 14, 1), ExactSolver(table_bytes=0, most_searched=0)
-    SolverSource(geodesics, planner).plan(task.state, None, shown=True)
-    few = max(nodes)
-    planner.solve(TaskProblems(geodesics).problem(task.state))
-    assert 1 <= few <= 15 < max(nodes)
+def test_plans_for_many_objects_come_from_one_search_that_is_never_repeated(geodesics, monkeypatch):
+    spent = []
+    monkeypatch.setattr(TaskSearch, "spend", lambda _, states: spent.append(states))
+    many = ExactSolver(
+        table_bytes=0, most_searched=0
+    )  # treats every problem as if it had more than 24 objects
+    task, source, problems = Task(geodesics, 12, 0), SolverSource(geodesics, many), TaskProblems(geodesics)
+    for _ in range(6):
+        plan, problem = source.plan(task.state, None, shown=True).plan, problems.problem(task.state)
+        check(problem, plan)
+        best = TABLE.solve(problem).cost
+        assert 0.9 * best < plan.lower_bound <= best + 2e-3
+        assert plan.cost < 1.08 * best
+        task.do(*list(possible_next(problem))[-1])
+    assert 0 < spent[0] <= TASK_WORK
+    assert spent[1:] == [0] * 5

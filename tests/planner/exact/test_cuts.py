@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ortools.math_opt.python import mathopt
-from planning_cases import Task, expected, grid_problem, random_problem, two_rooms
+from planning_cases import expected, grid_problem, random_problem
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import shortest_path
 
@@ -27,12 +27,10 @@ from planner.exact.instance import make_instance, to_visits
 from planner.exact.solver import ExactSolver
 from planner.exact.table import Solution
 from planner.exact.task_search import TaskSearch
-from planner.plan import Certificate, Plan, Proof, Status, VisitKind
+from planner.plan import Certificate, Plan, Proof, Status
 from planner.problem import after, make_plan, possible_next, tour_length
 from planner.problem_json import claim_from_json, claim_to_json
-from planner.solver_source import SolverSource
 from planner.solvers import NEVER, Deadline, SolveLimit, solver
-from planner.task_problems import TaskProblems
 
 CUTS = ExactSolver(table_bytes=0, most_searched=0)
 WORK = 60_000_000
@@ -269,23 +267,6 @@ def test_a_stopped_search_for_a_large_task_has_a_certificate_all_the_same():
     plan = search.plan(problem, limit=SolveLimit(stop=stop))
     check(problem, plan)
     assert plan.certificate.proof is Proof.RELAXATION
-
-
-def test_a_replan_for_many_objects_does_not_start_from_scratch(monkeypatch):
-    floor, solved = two_rooms(), []
-    solve = ExactSolver.solve
-    monkeypatch.setattr(
-        ExactSolver, "solve", lambda *args, **named: solved.append(None) or solve(*args, **named)
-    )
-    task, source = Task(floor, 9, 0), SolverSource(floor, CUTS)
-    route = source.plan(task.state, None, shown=True)
-    for visit in (route.visits[4], route.visits[6]):
-        if visit.kind is VisitKind.PICK:
-            task.do(*visit)
-            plan = source.plan(task.state, route, shown=True).plan
-            assert plan.lower_bound > 0.9 * plan.cost
-            check(TaskProblems(floor).problem(task.state), plan)
-    assert len(solved) == 1
 
 
 def test_small_problems_do_not_load_the_solvers():
