@@ -17,7 +17,7 @@ from experiments.house import House
 from planner.plan import Status, Visit, VisitKind
 from planner.regret import RegretEvaluator
 from planner.route import XY, Route, TaskState
-from planner.service import Mode, Planner
+from planner.service import Planner
 from planner.solver_source import SolverSource
 from planner.solvers import solver
 
@@ -42,7 +42,7 @@ def task(house: House, objects: int, seed: int) -> Iterator[dict[str, Any]]:
     loose = {o.name: (o.position[0], o.position[1]) for o in episode.objects}
     carried: list[str] = []
     source = SolverSource(house.geodesics, solver("exact"))
-    with contextlib.closing(Planner(source, RegretEvaluator(house.geodesics), Mode.LIVE)) as guide:
+    with contextlib.closing(Planner(source, RegretEvaluator(house.geodesics), live=True)) as guide:
         guide.prepare(TaskState((episode.start.x, episode.start.y), dict(loose), (), deliveries))
         while len(loose) + len(carried) > 1:
             kind, name = possible(loose, carried)[int(rng.integers(len(possible(loose, carried))))]

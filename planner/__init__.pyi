@@ -5,13 +5,12 @@ from .plan import Plan, Status, Visit, VisitKind
 from .problem import RoutingProblem, Shipment, possible_next, tour_length
 from .regret import Regret, RegretEvaluator
 from .route import TaskState
-from .service import Mode, Planner
+from .service import Planner
 from .solver_source import SolverSource
 from .solvers import SolveLimit, Solver, solver
 
 __all__ = [
     "Geodesics",
-    "Mode",
     "NavMesh",
     "Plan",
     "Planner",

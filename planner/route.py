@@ -86,9 +86,6 @@ class PlanSource(abc.ABC):
     def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:
         """Return a new route for a state, given the previous one. `Planner.ask` explains `shown`."""
 
-    def check(self, state: TaskState) -> None:  # noqa: B027 - optional
-        """Raise UnreachableError if objects cannot be fetched or delivered. The error lists their names."""
-
     @property
     def pending(self) -> bool:
         """True if a background search has results that `better` has not returned yet."""

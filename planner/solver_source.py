@@ -88,9 +88,6 @@ class SolverSource(PlanSource):
         self._planned: dict[str, XY] = {}  # positions of the loose objects when the plan was made
         self._search: _BackgroundSearch | None = None
 
-    def check(self, state: TaskState) -> None:
-        self.problems.check(state)
-
     def rest(self, route: Route, state: TaskState) -> tuple[Visit, ...] | None:
         """Return the remaining visits, or None if the participant deviated or an object was moved far."""
         return None if self._moved(state, state.loose) else remaining(route.visits, state)

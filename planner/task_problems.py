@@ -51,10 +51,6 @@ class TaskProblems:
             RESOLUTION,
         )
 
-    def check(self, state: TaskState) -> None:
-        """Raise UnreachableError if objects cannot be fetched or delivered. The error lists their names."""
-        self._places(state)
-
     def _snap(self, position: XY, max_distance: float = math.inf) -> XY:
         x, y = self._geodesics.navmesh.snap(position, max_distance)
         return float(x), float(y)

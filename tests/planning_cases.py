@@ -12,7 +12,7 @@ from planner.plan import VisitKind
 from planner.problem import RoutingProblem, Shipment
 from planner.regret import RegretEvaluator
 from planner.route import TaskState
-from planner.service import Mode, Planner
+from planner.service import Planner
 from planner.solver_source import SolverSource
 
 WALL = [
@@ -132,9 +132,9 @@ def two_rooms():
     return Geodesics(NavMesh.build(WALL, (0, 0, 8, 8)))
 
 
-def planner_of(geodesics, solver, mode=Mode.INLINE, **options):
+def planner_of(geodesics, solver, *, live=False, **options):
     """A planner that asks a solver."""
-    return Planner(SolverSource(geodesics, solver, **options), RegretEvaluator(geodesics), mode)
+    return Planner(SolverSource(geodesics, solver, **options), RegretEvaluator(geodesics), live=live)
 
 
 def asked(planner, state, **options):

@@ -41,40 +41,26 @@ class EventLog:
 
     def append(self, time: float, event: str, **fields: Any) -> None:
         """Log an event at a simulated time in seconds. Raises `RecordError` if a field is not valid JSON."""
-        self.fill(self.reserve(), time, event, **fields)
-
-    def fill(self, line: dict[str, Any], time: float, event: str, **fields: Any) -> None:
-        """Write an event to a reserved line. Raises `RecordError` if a field is not valid JSON."""
         entry = {"t": round(time, 6), "event": event, **fields}
         try:
             json.dumps(entry, allow_nan=False)
         except (TypeError, ValueError, RecursionError) as error:
             raise RecordError(f"{event!r} at {time:.2f} s cannot be logged: {error}") from error
-        line.update(entry)
-
-    def reserve(self) -> dict[str, Any]:
-        """Reserve a line for an event that is added later. A line that stays empty is not written."""
-        self._lines.append({})
-        return self._lines[-1]
+        self._lines.append(entry)
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        return [line for line in self._lines if line]
+        return list(self._lines)
 
     @property
     def content(self) -> bytes:
-        """The log as JSON lines in ASCII, without empty lines."""
+        """The log as JSON lines in ASCII."""
         return b"".join(map(_encoded, self._lines))
 
     @property
     def entries(self) -> int:
-        """The number of lines, including reserved lines."""
+        """The number of lines."""
         return len(self._lines)
-
-    @property
-    def event_counts(self) -> NDArray[np.int64]:
-        """The number of events in the first k lines, for each k from 0 to `entries`, shape (entries + 1,)."""
-        return np.cumsum([0, *map(bool, self._lines)])
 
     def at(self, entries: list[int]) -> tuple[NDArray[np.int64], NDArray[np.uint64]]:
         """Return the size in bytes and the hash of the first k lines of the log, for each k in `entries`.
@@ -94,7 +80,7 @@ class EventLog:
 
 
 def _encoded(line: Event) -> bytes:
-    return (json.dumps(line) + "\n").encode() if line else b""
+    return (json.dumps(line) + "\n").encode()
 
 
 def read_events(path: Path) -> list[Event]:

@@ -137,10 +137,9 @@ class RecordWriter:
             for step, state in self.checkpoints.items()
         ]
         events = self.log.events[self._committed :]
-        rows = self._rows[: self._length]
-        rows["logged"] = self.log.event_counts[rows["logged"]]  # the journal omits empty log lines
+        rows = self._rows[: self._length].tobytes()
         self._journal.append(
-            JournalEntry(rows.tobytes(), list(map(json.dumps, events)), self._unknown, states, participant)
+            JournalEntry(rows, list(map(json.dumps, events)), self._unknown, states, participant)
         )
         self._committed += len(events)
         self._length = 0

@@ -73,8 +73,6 @@ class Assistant:
         self._rerouted = state.rerouted
         numbered = any(item.number is not None for item in state.checklist)
         self.shows_plan = numbered or not self.shown_roles.isdisjoint(PLAN_ROLES)
-        if self.shows_plan:
-            self._planner.settle()
 
     def observe(self, observation: Observation, events: Sequence[WorldEvent]) -> None:
         """Process the last control step and its events, and make a new plan if necessary."""

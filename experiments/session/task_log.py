@@ -21,7 +21,7 @@ from planner.service import Planner
 class TaskLog:
     """A log of plans and visits, which is needed to measure deviations from the plan (PAPER section 6).
 
-    Plans are logged even if they are not shown. Log lines are filled in when the planner has answered.
+    Plans are logged even if they are not shown.
     """
 
     def __init__(
@@ -37,21 +37,18 @@ class TaskLog:
 
         Raises UnreachableError with the object names if objects cannot be fetched or delivered.
         """
-        line, first = self._log.reserve(), self._state is None
+        first = self._state is None
         if first:
             self._last_visit_at = position
             self._last_place = state.position
         self._state = state
-
-        def fill(route: Route, new: bool) -> None:
-            if new:
-                fields = _plan_fields(route)
-                if first:
-                    bound = reach_bound(round(route.plan.lower_bound, 6), self._house, self._episode)
-                    fields["reach_bound_m"] = round(bound, 6)
-                self._log.fill(line, time, "plan", **fields)
-
-        self._planner.ask(state, shown=shown, then=fill)
+        is_new, route = self._planner.ask(state, shown=shown), self._planner.route
+        if is_new and route is not None:
+            fields = _plan_fields(route)
+            if first:
+                bound = reach_bound(round(route.plan.lower_bound, 6), self._house, self._episode)
+                fields["reach_bound_m"] = round(bound, 6)
+            self._log.append(time, "plan", **fields)
 
     def improve(self, time: float, state: TaskState) -> bool:
         """Adopt a better plan for the same task if there is one. Return True if its visits differ."""
@@ -64,26 +61,21 @@ class TaskLog:
     def visit(self, time: float, made: Visit, position: NDArray[Any]) -> None:
         """Log a visit and compare it with the plan. `position` is the person's position in metres."""
         assert self._state is not None  # noqa: S101 - for the type checker
-        line, state, number = self._log.reserve(), self._state, self._visits
+        state, route = self._state, self._planner.route
         walk = self._house.body_geodesics.shortest_path(self._last_visit_at, position)
-        location = self._distance_to(state, made)
-
-        def fill(route: Route | None) -> None:
-            suggested = route.next if route else None
-            fields = {
-                "kind": made.kind.value,
-                "object": made.object,
-                "suggested": _as_json(suggested) if suggested else None,
-                "deviated": route is not None and suggested != made,
-                **self._alternatives(state, made, suggested),
-                **(self._regrets_of(number, made, route) if self._regrets else {}),
-                "position": [round(float(v), 6) for v in position],
-                "geodesic_m": round(walk.geodesic_distance, 6),
-                "location_m": round(location, 6),
-            }
-            self._log.fill(line, time, "visit", **fields)
-
-        self._planner.do(fill)
+        suggested = route.next if route else None
+        fields = {
+            "kind": made.kind.value,
+            "object": made.object,
+            "suggested": _as_json(suggested) if suggested else None,
+            "deviated": route is not None and suggested != made,
+            **self._alternatives(state, made, suggested),
+            **(self._regrets_of(made, route) if self._regrets else {}),
+            "position": [round(float(v), 6) for v in position],
+            "geodesic_m": round(walk.geodesic_distance, 6),
+            "location_m": round(self._distance_to(state, made), 6),
+        }
+        self._log.append(time, "visit", **fields)
         self._visits += 1
         self._last_visit_at = position
 
@@ -113,7 +105,7 @@ class TaskLog:
             "tied": made != suggested and made.kind is VisitKind.PLACE and made.object in tied,
         }
 
-    def _regrets_of(self, number: int, made: Visit, route: Route | None) -> dict[str, Any]:
+    def _regrets_of(self, made: Visit, route: Route | None) -> dict[str, Any]:
         proven = route is not None and route.plan.status is Status.OPTIMAL
         suggested = route.next if route else None
         names: dict[Visit, tuple[str, ...]] = {made: ("regret",)}
@@ -124,7 +116,7 @@ class TaskLog:
             if proven and visit == suggested:
                 fields |= _regret_fields(keys, RegretBounds(0.0, 0.0, 0.0))
             else:
-                fields |= _regret_fields(keys, self._planner.judge(visit, (number, keys)))
+                fields |= _regret_fields(keys, self._planner.judge(visit, (self._visits, keys)))
         return fields
 
 

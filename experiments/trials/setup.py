@@ -27,10 +27,9 @@ from mjsim.values.episode import Episode
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.world import World
-from planner.exact.solver import ExactSolver
 from planner.regret import RegretEvaluator
 from planner.route import TaskState
-from planner.service import Mode, Planner
+from planner.service import Planner
 from planner.solver_source import SolverSource
 
 _SESSION = 77  # keeps the session's random numbers independent of the house's random numbers
@@ -94,15 +93,12 @@ def regret_evaluator(config: TrialConfig, house: House) -> RegretEvaluator:
 
 
 def prepared_planner(config: TrialConfig, house: House, episode: Episode) -> Planner:
-    """Create a planner for a trial and start planning. The caller must close the planner.
+    """Create a planner for a trial. The caller must close the planner.
 
-    The exact planner runs in a thread, because its kernels release the GIL. The first plan is prepared before
-    the clock of the trial starts.
+    A live planner prepares the first plan before the clock of the trial starts.
     """
-    mode = Mode.THREAD if isinstance(planner_named(config.planner), ExactSolver) else Mode.INLINE
-    mode = Mode.LIVE if config.live else mode
-    planner = Planner(solver_source(config, house), regret_evaluator(config, house), mode)
-    if mode is not Mode.INLINE:
+    planner = Planner(solver_source(config, house), regret_evaluator(config, house), live=config.live)
+    if config.live:
         first = TaskState(
             position=(episode.start.x, episode.start.y),
             loose={placed.name: placed.position[:2] for placed in episode.objects},

@@ -96,22 +96,33 @@ class TaskSearch:
 
         `before` is the problem of an earlier state of the same task and its plan.
         """
+        rest, lower = (None, 0.0) if before is None else rest_of(*before, problem)
+        if rest is not None and self._is_large(problem):
+            plan = self._bounded(problem, rest)
+        else:
+            plan = self._searched(problem, seed, limit)
+        return _raised(plan, lower)
+
+    def _bounded(self, problem: RoutingProblem, visits: tuple[Visit, ...]) -> Plan:
         from planner.exact.multipliers import first_bound, warm_bound
+
+        started, metric = time.perf_counter(), problem.integers.metric
+        instance, length = make_instance(problem, metric), int(tour_length(problem, visits, metric))
+        if (start := self.start(problem, instance)) is not None:
+            bound = warm_bound(instance, start, HURRIED_ROWS)
+        else:
+            bound = first_bound(instance, length)
+        return make_plan(problem, visits, length, bound.root, started, bound.certificate)
+
+    def _searched(self, problem: RoutingProblem, seed: int, limit: SolveLimit | None) -> Plan:
         from planner.exact.search import WARM_ROWS, improving_tours  # this import takes 0.5 s
 
         started, metric, large = time.perf_counter(), problem.integers.metric, self._is_large(problem)
         instance, n = make_instance(problem, metric), len(problem.shipments)
         start, stopped = self.start(problem, instance), limit is not None and limit.stopped
         work = 0 if stopped else self.share(problem)
-        rest, lower = (None, 0.0) if before is None else rest_of(*before, problem)
-        if large and rest is not None:
-            length = int(tour_length(problem, rest, metric))
-            known = start is not None
-            bound = warm_bound(instance, start, HURRIED_ROWS) if known else first_bound(instance, length)
-            return _raised(make_plan(problem, rest, length, bound.root, started, bound.certificate), lower)
-        rows = HURRIED_ROWS if stopped or large else WARM_ROWS
-        passes, end = self._solver.passes, Deadline.of(limit)
-        *_, best = improving_tours(instance, seed, work, end, passes, start, rows)
+        rows, end = HURRIED_ROWS if stopped or large else WARM_ROWS, Deadline.of(limit)
+        *_, best = improving_tours(instance, seed, work, end, self._solver.passes, start, rows)
         self.spend(best.expanded)
         actions = _annealed(instance, seed, best.actions, first=start is None) if large else best.actions
         visits = to_visits(instance, actions, problem.names[:n], problem.names[n:])
@@ -121,7 +132,7 @@ class TaskSearch:
             self._most = min(self._most, n - PAUSE)
         is_better = plan.status is Status.OPTIMAL or not self._warm.multipliers
         self.learn(problem, plan if is_better else replace(plan, certificate=None))
-        return _raised(plan, lower)
+        return plan
 
 
 def _annealed(instance: Instance, seed: int, actions: list[int], *, first: bool) -> list[int]:

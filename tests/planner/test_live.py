@@ -29,7 +29,7 @@ from planner.plan import Plan, Status, VisitKind
 from planner.problem import possible_next, tour_length
 from planner.regret import RegretEvaluator
 from planner.route import TaskState, remaining
-from planner.service import Mode, Planner
+from planner.service import Planner
 from planner.solver_source import TIE, SolverSource
 from planner.solvers import SolveLimit, solver
 from planner.task_problems import TaskProblems
@@ -41,7 +41,7 @@ def geodesics():
 
 
 def live(geodesics, solver, **options):
-    return contextlib.closing(planner_of(geodesics, solver, Mode.LIVE, **options))
+    return contextlib.closing(planner_of(geodesics, solver, live=True, **options))
 
 
 class Script:

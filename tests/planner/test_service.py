@@ -1,4 +1,4 @@
-"""Check that a plan is kept while it is followed, and replaced after a deviation, in every mode."""
+"""Check that a plan is kept while it is followed, and replaced after a deviation."""
 
 import contextlib
 import itertools
@@ -6,13 +6,12 @@ import itertools
 import pytest
 from planning_cases import BINS, SEARCH, Task, asked, planner_of, two_rooms
 
-from planner.errors import PlannerError, ProblemError, UnreachableError
-from planner.exact.solver import ExactSolver
+from planner.errors import ProblemError, UnreachableError
 from planner.plan import Status, VisitKind
 from planner.problem import tour_length
 from planner.regret import RegretEvaluator
 from planner.route import TaskState
-from planner.service import Mode, Planner
+from planner.service import Planner
 from planner.solver_source import SolverSource
 from planner.solvers import SolveLimit, solver
 from planner.task_problems import TaskProblems
@@ -33,10 +32,10 @@ def length(geodesics, task, visits):
     return sum(geodesics.shortest_path(a, b).geodesic_distance for a, b in itertools.pairwise(stops))
 
 
-@pytest.mark.parametrize("mode", Mode)
-def test_a_followed_plan_is_walked_to_its_end_without_a_change_of_mind(geodesics, mode):
+@pytest.mark.parametrize("live", [False, True])
+def test_a_followed_plan_is_walked_to_its_end_without_a_change_of_mind(geodesics, live):
     task, walked = Task(geodesics, 8, 3), 0.0
-    with contextlib.closing(planner_of(geodesics, SEARCH, mode)) as guide:
+    with contextlib.closing(planner_of(geodesics, SEARCH, live=live)) as guide:
         guide.prepare(task.state)
         planned = asked(guide, task.state)
         assert planned.plan.status is Status.OPTIMAL
@@ -131,34 +130,9 @@ def test_there_is_no_route_before_the_first_question(geodesics):
     assert guide.improve(Task(geodesics, 3).state) is None
 
 
-def answers(guide, geodesics, seed, *, shown):
-    """Return everything that a planner reports during a task with deviations."""
-    task, found = Task(geodesics, 7, seed), []
-    guide.prepare(task.state)
-    for step in range(8):
-        guide.ask(task.state, shown=shown, then=lambda route, new: found.append((route.visits, new)))
-        guide.do(lambda route: found.append(route.plan.cost))
-        other = sorted(task.loose)[-1] if task.loose and len(task.carried) < 2 else None
-        visit = (VisitKind.PICK, other) if step % 3 == 1 and other else guide.next
-        guide.do(lambda _, visit=visit, step=step: found.append(guide.judge(visit, step)))
-        found.append([regret.regret for regret in guide.regrets().values()])
-        task.do(*visit)
-    guide.settle()
-    return found, guide.replans, guide.finish()
-
-
-@pytest.mark.parametrize("shown", [True, False])
-@pytest.mark.parametrize("seed", range(3))
-def test_a_thread_gives_the_answers_that_are_given_inline(geodesics, seed, shown):
-    one, other = (planner_of(geodesics, solver("exact"), mode) for mode in (Mode.INLINE, Mode.THREAD))
-    with contextlib.closing(other):
-        assert answers(one, geodesics, seed, shown=shown) == answers(other, geodesics, seed, shown=shown)
-    assert one.replans > 0
-
-
 def test_a_plan_for_another_start_is_not_followed(geodesics):
     task = Task(geodesics, 5, 1)
-    with contextlib.closing(planner_of(geodesics, solver("exact"), Mode.THREAD)) as guide:
+    with contextlib.closing(planner_of(geodesics, solver("exact"), live=True)) as guide:
         guide.prepare(task.state)
         task.position = task.anywhere()
         found = asked(guide, task.state)
@@ -166,31 +140,18 @@ def test_a_plan_for_another_start_is_not_followed(geodesics):
     assert guide.replans == 0
 
 
-@pytest.mark.parametrize("mode", Mode)
-def test_objects_out_of_reach_are_listed_by_name_at_once_and_planning_goes_on(geodesics, mode):
+@pytest.mark.parametrize("live", [False, True])
+def test_objects_out_of_reach_are_listed_by_name_at_once_and_planning_goes_on(geodesics, live):
     task = Task(geodesics, 4)
-    with contextlib.closing(planner_of(geodesics, solver("exact"), mode)) as guide:
+    with contextlib.closing(planner_of(geodesics, solver("exact"), live=live)) as guide:
         guide.prepare(task.state)
         home, bin_ = task.loose["object_01"], task.deliveries["object_02"]
         task.loose["object_01"], task.deliveries["object_02"] = (20.0, 20.0), (1.0, -5.0)
         with pytest.raises(UnreachableError) as caught:
-            guide.ask(task.state, then=lambda *_: pytest.fail("there is no answer"))
+            guide.ask(task.state)
         assert set(caught.value.names) == {"object_01", "object_02"}
         task.loose["object_01"], task.deliveries["object_02"] = home, bin_
         assert len(asked(guide, task.state).visits) == 8
-
-
-def test_a_planner_that_fails_in_a_thread_fails_the_next_caller_that_needs_it(geodesics):
-    class Lost(ExactSolver):
-        def solve(self, *_, **__):
-            raise PlannerError("out of ideas")
-
-    with contextlib.closing(planner_of(geodesics, Lost(), Mode.THREAD)) as guide:
-        guide.ask(Task(geodesics, 3).state)
-        guide.wait()
-        for needs in (lambda: guide.next, guide.regrets, guide.finish, lambda: guide.do(pytest.fail)):
-            with pytest.raises(PlannerError, match="out of ideas"):
-                needs()
 
 
 def test_regrets_that_are_shown_leave_the_budget_of_those_that_are_logged(geodesics):

@@ -38,7 +38,7 @@ from mjsim.house.scene.scene import compose
 from mjsim.values.actions import Action
 from mjsim.values.options import WorldOptions
 from mjsim.world.world import World
-from planner.service import Mode, Planner
+from planner.service import Planner
 
 LOG = logging.getLogger("mjsim.play")
 MAX_JOURNAL = 512 * 1024**2  # journal size in bytes at which a session ends (after about 7 h with 6 objects)
@@ -137,7 +137,7 @@ class LiveSession:
                 LogSource(record.plans, lambda: self.session.time),
                 regret_evaluator(config, self.house),
             )
-            self._planner = Planner(logged, evaluator, Mode.LIVE)
+            self._planner = Planner(logged, evaluator, live=True)
         log = EventLog()
         self.session, _ = prepare_session(
             config,
