@@ -1,6 +1,5 @@
 """Draw a figure of the four levels of difficulty in the paper."""
 
-import contextlib
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +7,7 @@ import numpy as np
 from experiments.house import House
 from experiments.record.run_directory import check_file
 from experiments.trials.floor_plan import planned_path, task_picture
-from experiments.trials.setup import prepared_planner, trial_episode
+from experiments.trials.setup import first_state, solver_source, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from tools.gallery import save_png
 
@@ -29,9 +28,7 @@ def make_levels(out: Path, seed: int, *, replace: bool) -> Path:
         house = House.load(config.house)
         episode, way = trial_episode(config, house), None
         if objects == LEVEL_OBJECTS[0]:
-            with contextlib.closing(prepared_planner(config, house, episode)) as planner:
-                route = planner.route
-            assert route is not None  # noqa: S101 - it was prepared
+            route = solver_source(config, house).plan(first_state(house, episode), None, shown=True)
             visits = [(visit.kind.value, visit.object) for visit in route.visits]
             way = planned_path(house, episode, {"visits": visits})
         pictures.append(task_picture(house, episode, f"{objects} objects", way))

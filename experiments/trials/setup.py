@@ -99,14 +99,18 @@ def prepared_planner(config: TrialConfig, house: House, episode: Episode) -> Pla
     """
     planner = Planner(solver_source(config, house), regret_evaluator(config, house), live=config.live)
     if config.live:
-        first = TaskState(
-            position=(episode.start.x, episode.start.y),
-            loose={placed.name: placed.position[:2] for placed in episode.objects},
-            carried=(),
-            deliveries=deliveries(house, episode),
-        )
-        planner.prepare(first, seconds=PREPARATION_S)
+        planner.prepare(first_state(house, episode), seconds=PREPARATION_S)
     return planner
+
+
+def first_state(house: House, episode: Episode) -> TaskState:
+    """Return the state in which the task of an episode begins."""
+    return TaskState(
+        position=(episode.start.x, episode.start.y),
+        loose={placed.name: placed.position[:2] for placed in episode.objects},
+        carried=(),
+        deliveries=deliveries(house, episode),
+    )
 
 
 def prepare_session(
