@@ -164,16 +164,26 @@ def short(number):
     return f"{float(f'{number:.4g}'):g}"
 
 
+def in_words(usual):
+    if isinstance(usual, float):
+        return short(usual)
+    ((kind, numbers),) = usual.items()
+    if kind == "mixture":
+        return ", ".join(
+            f"{weight:g}: {part if isinstance(part, float) else in_words(part)}" for weight, part in numbers
+        )
+    return f"{kind} {numbers}"
+
+
 @pytest.mark.parametrize(
     ("name", "parameters"),
     [("participants.md", PARAMETERS), ("participants.md", {name: PERSON[name] for name in RANGES})],
 )
-def test_the_table_of_a_page_lists_every_parameter_with_its_range(name, parameters):
+def test_the_table_of_a_page_lists_every_parameter_with_its_default_and_range(name, parameters):
     for key, parameter in parameters.items():
         (row,) = [line for line in page(name).splitlines() if line.startswith(f"| `{key}` |")]
         bounds = f"{short(parameter.lowest)} to {short(parameter.highest)}"
-        assert f"| {bounds} | {parameter.unit} |" in row
-        assert not isinstance(parameter.usual, float) or f"| {short(parameter.usual)} | {bounds} |" in row
+        assert f"| {in_words(parameter.usual)} | {bounds} | {parameter.unit} |" in row
 
 
 def test_the_examples_of_the_pages_describe_behaviour_and_people():

@@ -21,7 +21,7 @@ from mjsim.values.errors import StateError
 from mjsim.values.observation import ObjectStatus, StepStates
 from mjsim.values.options import FIDELITIES, WorldOptions
 from mjsim.values.person_parameters import PersonParameters
-from mjsim.world.body.rig import VX, VY, X, Y
+from mjsim.world.body.rig import HEADING, LOOK, PITCH, PITCH_RATE, TURN, TURN_RATE, VX, VY, X, Y
 from mjsim.world.fidelity import kinematics
 from mjsim.world.fidelity import trunk_contact as trunk
 from mjsim.world.fidelity.kinematics import Gait
@@ -330,29 +330,43 @@ def test_the_fall_of_an_object_moves_no_other_that_it_does_not_touch(house):
     assert (after.object_quaternions[ball] == before.object_quaternions[ball]).all()
 
 
-def hands_while_placing(house, fidelity):
-    """Return both hands in the body frame at every control step of a place that begins with a half turn."""
-    world, rows = world_of(house, fidelity), []
+def motions_of(house, fidelity):
+    """Return the body, and both hands in its frame, at every control step of two picks and a place after a turn."""
+    world, bodies, hands = world_of(house, fidelity), [], []
+
+    def record(action):
+        world.step(action)
+        while world.busy:
+            o, body = world.observation(), world.body
+            c, s = math.cos(o.heading), math.sin(o.heading)
+            seen = np.array([world.data.site(f"avatar/{hand}_grip").xpos for hand in avatar.HANDS])
+            ahead, left = (seen[:, :2] - o.position).T
+            hands.append([c * ahead + s * left, c * left - s * ahead, seen[:, 2]])
+            bodies.append(body)
+            assert np.abs(world.hands.T - hands[-1]).max() < 0.04
+            world.step(Move())
+
+    walk(world, [[0.0, 0.0, 0.0, 0.5]] * 20)
     for name in ("o0", "o1"):
-        fetch(world, name)
+        o = world.observation()
+        x, y = o.object_positions[o.object_names.index(name), :2]
+        walk_to(world, x - 0.65, y, within=0.1)
+        record(Pick(name))
     walk_to(world, 0.9, 3.0)
     face(world, 1.5, 2.3)
-    world.step(Place("o0"))
-    while world.busy:
-        o = world.observation()
-        c, s = math.cos(o.heading), math.sin(o.heading)
-        hands = np.array([world.data.site(f"avatar/{hand}_grip").xpos for hand in avatar.HANDS])
-        ahead, left = (hands[:, :2] - o.position).T
-        rows.append([c * ahead + s * left, c * left - s * ahead, hands[:, 2]])
-        assert np.abs(world.hands.T - rows[-1]).max() < 0.01
-        world.step(Move())
-    return np.array(rows)
+    record(Place("o0"))
+    return np.array(bodies), np.array(hands)
 
 
-def test_both_hands_move_as_in_physics_while_a_person_turns_and_reaches(house):
-    full, event = (hands_while_placing(house, fidelity) for fidelity in FIDELITIES)
-    assert len(event) == len(full) > 50
-    assert np.abs(event - full).max() < 0.03
+def test_the_body_the_head_and_both_hands_move_as_in_physics_during_picks_and_places(house):
+    (full, full_hands), (event, event_hands) = (motions_of(house, fidelity) for fidelity in FIDELITIES)
+    assert len(event) == len(full) > 120
+    assert np.abs(event_hands - full_hands).max() < 0.03
+    apart = np.abs(event - full).max(axis=0)
+    assert apart[[X, Y, PITCH, LOOK]].max() < 0.003
+    assert apart[[HEADING, TURN, TURN_RATE]].max() < 0.03
+    assert apart[PITCH_RATE] < 0.1
+    assert np.ptp(event[:, LOOK]) > 0.8 and np.ptp(event[:, HEADING]) > 2.0
 
 
 def test_a_full_receptacle_takes_no_more(cramped_catalogue):
