@@ -134,6 +134,22 @@ def test_a_path_in_one_call_is_walked_as_step_by_step(house, fidelity):
             fetch(singly, name)
 
 
+@tiers
+def test_a_path_that_is_not_shown_is_walked_to_its_end_and_in_physics_by_one_step_for_each_action(
+    house, fidelity
+):
+    at_once, singly = settled(house, fidelity), settled(house, fidelity)
+    corners = np.array([at_once.observation().position, (1.4, 1.9)])
+    path, stopped, moved = FollowPath(corners, corners[-1], 0.1, shown=False), None, 0
+    while stopped is not Stop.ARRIVED:
+        step = check_steps(at_once, singly, path)
+        assert fidelity == "event" or len(step.steps) == 1
+        stopped, moved = step.stopped, moved + len(step.steps)
+        assert moved < 60
+    assert moved > 5
+    assert math.dist(at_once.observation().position, corners[-1]) < 0.1
+
+
 def test_a_walk_in_one_call_ends_with_an_event(house, monkeypatch):
     """As when an object is lost, so that the person can decide anew."""
     world, steps = settled(house, "full"), []
