@@ -161,24 +161,59 @@ def test_what_the_checker_does_not_repeat_is_named(proven):
     assert not found.optimal
 
 
+START = 4 * 4 + 13 * 5  # number of the state at the start, with four bins and thirteen objects
+
+
 @pytest.mark.parametrize(
-    "changes",
+    ("changes", "fault"),
     [
-        {"multipliers": (0,) * 12},
-        {"cuts": ((13, 1, (0,)),)},
-        {"cuts": ((0, -1, (0,)),)},
-        {"cuts": ((0, 1, (10**6,)),)},
-        {"cuts": ((0, 1, (-1,)),)},
-        {"cuts": ((0, 1, (4 * 4 + 13 * 5,)),)},
-        {"multipliers": (2**52,) * 13, "parts": 2**40},
-        {"parts": 0},
-        {"unit": 0.0},
+        ({"multipliers": (0,) * 12}, "do not fit"),
+        ({"cuts": ((13, 1, (0,)),)}, "do not fit"),
+        ({"cuts": ((-1, 1, (0,)),)}, "do not fit"),
+        ({"cuts": ((0, -1, (0,)),)}, "do not fit"),
+        ({"cuts": ((0, 1, (-1,)),)}, "the start or an unknown node"),
+        ({"cuts": ((0, 1, (0, START)),)}, "the start or an unknown node"),
+        ({"cuts": ((0, 1, (START + 1,)),)}, "the start or an unknown node"),
+        ({"cuts": ((0, 1, (10**6,)),)}, "the start or an unknown node"),
+        ({"multipliers": (2**58,) * 13}, "multipliers of the certificate are too large"),
+        ({"multipliers": (-(2**58),) * 13}, "multipliers of the certificate are too large"),
+        ({"parts": 2**50}, "multipliers of the certificate are too large"),
+        ({"cuts": ((0, 2**58, (0,)),)}, "multipliers of the certificate are too large"),
+        ({"parts": 0}, "do not fit"),
+        ({"unit": 0.0}, "do not fit"),
+        ({"unit": 1e-300}, "do not fit"),
     ],
 )
-def test_a_certificate_that_does_not_fit_is_refused(proven, changes):
+def test_a_certificate_that_does_not_fit_is_refused_whatever_it_claims(proven, changes, fault):
     problem, plan = proven
-    with pytest.raises(ProblemError, match="certificate"):
-        check(problem, claiming(plan, **changes))
+    assert len({s.delivery for s in problem.shipments} | set(problem.onboard)) == 4
+    with pytest.raises(ProblemError, match=fault):
+        check(problem, claiming(plan, **{"root": -(10**15), **changes}))
+
+
+def test_a_cut_of_all_states_but_the_start_is_accepted(proven):
+    problem, plan = proven
+    everything = Certificate(
+        Proof.CUTS,
+        plan.certificate.unit,
+        0,
+        multipliers=(0,) * 13,
+        cuts=((0, 1, tuple(range(START))),),
+        parts=1,
+    )
+    assert cuts_bound(problem, everything) >= 0.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_each_leg_of_a_tour_may_have_been_rounded_up_by_half_a_unit(seed):
+    problem = random_problem(seed, 9, seed)
+    claim = Certificate(Proof.CUTS, 0.01, -(10**15), multipliers=(0,) * 9, parts=1)
+    walks = shortest_path(np.minimum(problem.distances, problem.distances.T))
+    whole = dataclasses.replace(problem, distances=np.rint(walks / 0.01))
+    exact = cuts_bound(whole, dataclasses.replace(claim, unit=1.0))
+    assert exact > 0
+    found = cuts_bound(dataclasses.replace(problem, distances=walks), claim)
+    assert found == pytest.approx(0.01 * (exact - 0.5 * (2 * 9 + seed)))
 
 
 @pytest.mark.slow

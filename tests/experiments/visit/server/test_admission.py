@@ -140,6 +140,18 @@ def test_a_place_that_is_given_back_after_the_last_one_was_taken_is_offered_at_o
         assert site.begin(client, **ids(2))
 
 
+def test_no_more_people_come_within_seconds_than_places_were_counted(tmp_path):
+    """The number of free places is kept for ten seconds, but each new person reduces it."""
+    recruitment = f'[study.recruitment]\nplatform = "prolific"\n{CODES}'
+    with served(tmp_path, PHASES + recruitment) as site, site.client() as client:
+        site.ask(site.store.set_quota(0, 2, "test"))
+        for number in range(2):
+            assert "Enough people" not in client.get("/", params=ids(number)).text
+            agree(client, site.begin(client, **ids(number)))
+        assert "Enough people" in client.post("/begin", data=ids(2)).text
+        assert len(site.ask(site.store.people())) == 2
+
+
 def test_only_new_people_count_towards_the_limit_of_an_address(tmp_path, monkeypatch):
     monkeypatch.setattr("experiments.visit.server.admission.NEW_PEOPLE", (3, 60.0))
     recruitment = f'[study.recruitment]\nplatform = "prolific"\n{CODES}'
