@@ -2,19 +2,25 @@
 
 import dataclasses
 
+import av
+import msgspec
+import numpy as np
 import pytest
 from sessions import Recorder
 
+from experiments.errors import RecordError
 from experiments.record.records import EventLog
 from experiments.session import first_person
 from experiments.session.film_config import FilmConfig
-from experiments.session.first_person import FirstPersonRenderer
+from experiments.session.first_person import Filming, FirstPersonRenderer, TrialFilm
+from experiments.session.video import VideoWriter
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.compose import Compositor
 from hud.state import FLOORPLAN
 from mjsim.house.scene.scene import compose
 from mjsim.render import Renderer, render_house_map
+from mjsim.values.errors import RenderError
 
 DEMO = TrialConfig(objects=6, assistance="guided", seed=0, fidelity="event")
 FILM = FilmConfig.with_panels(640, 360, "draft")
@@ -38,14 +44,21 @@ class Checker(Recorder):
 
 
 @pytest.fixture(scope="module")
-def checked(house):
+def scene(house):
+    return compose(trial_episode(DEMO, house), house.catalogue)
+
+
+@pytest.fixture(scope="module")
+def drawn(house, scene):
+    with FirstPersonRenderer(scene, house, FILM) as renderer:
+        yield renderer
+
+
+@pytest.fixture(scope="module")
+def checked(house, scene, drawn):
     """The demo, whose hands were compared."""
-    scene = compose(trial_episode(DEMO, house), house.catalogue)
     width, height = FILM.view[2:]
-    with (
-        FirstPersonRenderer(scene, house, FILM) as drawn,
-        Renderer(scene.model, width=width, height=height, profile="draft") as bare,
-    ):
+    with Renderer(scene.model, width=width, height=height, profile="draft") as bare:
         checker = Checker(drawn, bare)
         session, _ = prepare_session(DEMO, house, scene, EventLog(), checker)
         session.run()
@@ -85,3 +98,103 @@ def test_a_minimap_shows_the_house_from_above_also_if_its_picture_is_drawn_late(
             frames.append(drawn.frame(world.data, state))
     assert state.minimap is not None
     assert (frames[0] == frames[1]).all()
+
+
+@pytest.fixture(scope="module")
+def begun(house, scene):
+    """The world, the observation and the HUD at the start of the demo."""
+    config, recorder = msgspec.structs.replace(DEMO, time_limit=0.2), Recorder()
+    session, world = prepare_session(config, house, scene, EventLog(), recorder)
+    session.run()
+    return world, *recorder.shown[0]
+
+
+class Lent:
+    """A renderer that is used again after it was closed, because a new one takes seconds."""
+
+    def __init__(self, drawn):
+        self.frame, self.camera_view = drawn.frame, drawn.camera_view
+        self.closed = 0
+
+    def close(self):
+        self.closed += 1
+
+
+@pytest.mark.parametrize("kind", ["film of a trial", "film of a replay"])
+def test_every_frame_that_is_shown_is_filmed_and_the_camera_is_that_of_the_view(
+    house, scene, drawn, begun, tmp_path, monkeypatch, kind
+):
+    world, observation, state = begun
+    path, frame, camera, lent = (
+        tmp_path / "film.mp4",
+        drawn.frame(world.data, state),
+        drawn.camera_view(world.data),
+        Lent(drawn),
+    )
+    monkeypatch.setattr(first_person, "FirstPersonRenderer", lambda *_: lent)
+    if kind == "film of a trial":
+        film = TrialFilm(scene, house, FILM, path)
+        close = film.close
+    else:
+        writer = VideoWriter(path, width=FILM.width, height=FILM.height)
+        film, close = Filming(lent, writer), writer.close
+    found = film.camera(world)
+    for _ in range(3):
+        film.show(world, observation, state)
+    close()
+    assert (found.position == camera.position).all() and (found.rotation == camera.rotation).all()
+    assert (found.fovy, found.width, found.height) == (camera.fovy, camera.width, camera.height)
+    with av.open(str(path)) as container:
+        shown = [image.to_ndarray(format="rgb24") for image in container.decode(video=0)]
+    assert len(shown) == 3
+    assert all(np.abs(image.astype(int) - frame).mean() < 12 for image in shown)
+    if kind == "film of a trial":
+        assert film.renderer_name and film.failure is None
+        assert len(film.frames_sha256) == 64 and lent.closed == 1
+
+
+def fail(error):
+    def failing(*_, **__):
+        raise error
+
+    return failing
+
+
+@pytest.mark.parametrize(
+    ("step", "error"),
+    [
+        ("the renderer", RenderError("no context")),
+        ("the renderer", OSError("no driver")),
+        ("the writer", RecordError("odd size")),
+        ("a picture", RenderError("lost context")),
+        ("a frame", RecordError("disk full")),
+        ("the end", RecordError("disk full")),
+    ],
+)
+def test_a_trial_whose_film_fails_goes_on_without_a_film_and_its_file(
+    house, scene, drawn, begun, tmp_path, monkeypatch, step, error
+):
+    world, observation, state = begun
+    path, attempts, lent = tmp_path / "film.mp4", [], Lent(drawn)
+    monkeypatch.setattr(
+        first_person, "FirstPersonRenderer", fail(error) if step == "the renderer" else lambda *_: lent
+    )
+    if step == "the writer":
+        monkeypatch.setattr(first_person, "VideoWriter", fail(error))
+    film = TrialFilm(scene, house, FILM, path)
+    film.show(world, observation, state)
+    if step == "a picture":
+        lent.frame = fail(error)
+    elif step == "a frame":
+        monkeypatch.setattr(film._video, "write", lambda frame: attempts.append(frame) or fail(error)())
+    elif step == "the end":
+        completed = film._video.close
+        monkeypatch.setattr(film._video, "close", lambda: completed() or fail(error)())
+    for _ in range(2):
+        film.show(world, observation, state)
+    film.close()
+    assert film.failure == f"no video: {error}"
+    assert film.frames_sha256 is None and not path.exists()
+    assert len(attempts) == (step == "a frame"), "nothing is written after the first failure"
+    assert (film.camera(world) is None) == (step == "the renderer")
+    assert lent.closed == (step != "the renderer")
