@@ -132,7 +132,7 @@ class Api:
         except (httpx.ConnectError, httpx.ConnectTimeout) as error:
             raise StoppedError(f"the platform cannot be reached: {error}") from error
         except (httpx.HTTPError, TimeoutError) as error:
-            raise UnsureError(f"no answer of the platform: {error or type(error).__name__}") from error
+            raise UnsureError(f"no answer of the platform: {str(error) or type(error).__name__}") from error
 
 
 class ApiPayer:

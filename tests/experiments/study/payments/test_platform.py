@@ -1,11 +1,23 @@
-"""The HTTP client of recruitment platforms: how long it waits before it repeats a request."""
+"""The HTTP client of recruitment platforms: when it repeats a request, and which outcomes it knows for certain."""
 
 import asyncio
 
 import httpx
 import pytest
 
-from experiments.study.payments.platform import LONGEST_WAIT, TOO_MANY, TRIES, Api, DeclinedError
+from experiments.errors import ConfigError
+from experiments.study.payments.platform import (
+    LONGEST_WAIT,
+    MAX_TEXT,
+    TOO_MANY,
+    TRIES,
+    Api,
+    DeclinedError,
+    Order,
+    StoppedError,
+    UnsureError,
+    secret,
+)
 
 
 def asked(monkeypatch, headers, busy):
@@ -52,3 +64,101 @@ def test_a_request_is_given_up_without_a_last_pause(monkeypatch):
     pauses, answer = asked(monkeypatch, {}, busy=TRIES)
     assert pauses == [1.0] * (TRIES - 1)
     assert isinstance(answer, DeclinedError) and "429" in str(answer)
+
+
+def outcome(answer):
+    """Return the result of a request that a platform answers in this way, or the error that it leads to."""
+
+    async def respond(_):
+        if isinstance(answer, Exception):
+            raise answer
+        if answer == "never":
+            await asyncio.sleep(60.0)
+        return answer
+
+    async def run():
+        api = Api("http://platform.example", {})
+        api._timeout = 0.05
+        api._client = httpx.AsyncClient(
+            base_url="http://platform.example", transport=httpx.MockTransport(respond)
+        )
+        try:
+            return await api.ask("POST", "/pay")
+        finally:
+            await api.close()
+
+    try:
+        return asyncio.run(run())
+    except (DeclinedError, UnsureError) as error:
+        return error
+
+
+@pytest.mark.parametrize(
+    ("answer", "kind", "message"),
+    [
+        (httpx.ConnectError("refused"), StoppedError, "the platform cannot be reached: refused"),
+        (httpx.ConnectTimeout("slow"), StoppedError, "the platform cannot be reached: slow"),
+        (httpx.ReadError("reset"), UnsureError, "no answer of the platform: reset"),
+        (httpx.ReadTimeout(""), UnsureError, "no answer of the platform: ReadTimeout"),
+        (httpx.RemoteProtocolError("cut off"), UnsureError, "no answer of the platform: cut off"),
+        ("never", UnsureError, "no answer of the platform: TimeoutError"),
+        (httpx.Response(401), StoppedError, "the platform rejects this secret: 401"),
+        (
+            httpx.Response(403, text="no  scope"),
+            StoppedError,
+            "the platform rejects this secret: 403 no scope",
+        ),
+        (httpx.Response(400, text="bad"), DeclinedError, "the platform says 400 bad"),
+        (httpx.Response(404), DeclinedError, "the platform says 404"),
+        (httpx.Response(302), DeclinedError, "the platform says 302"),
+        (httpx.Response(500, text="oops"), UnsureError, "the platform failed: 500 oops"),
+        (httpx.Response(503), UnsureError, "the platform failed: 503"),
+        (
+            httpx.Response(200, text="<html>"),
+            UnsureError,
+            "the platform's answer is not understood: 200 <html>",
+        ),
+        (httpx.Response(400, text="x" * 999), DeclinedError, "the platform says 400 " + "x" * MAX_TEXT),
+    ],
+)
+def test_an_error_says_whether_the_platform_may_have_paid_and_whether_it_will_pay_others(
+    answer, kind, message
+):
+    found = outcome(answer)
+    assert (type(found), str(found)) == (kind, message)
+
+
+def test_answers_are_json_or_empty():
+    assert outcome(httpx.Response(200, json={"id": 7})) == {"id": 7}
+    assert outcome(httpx.Response(201, json=[])) == []
+    assert outcome(httpx.Response(204)) is None
+
+
+@pytest.mark.parametrize(
+    ("cents", "amount"),
+    [(0, "0.00"), (5, "0.05"), (750, "7.50"), (100, "1.00"), (99, "0.99"), (123456, "1234.56")],
+)
+def test_an_order_has_a_decimal_amount_and_the_ids_of_the_person(cents, amount):
+    order = Order("key", 1, "bonus", cents, "why", {"PROLIFIC_PID": "anna", "SESSION_ID": ""})
+    assert order.amount == amount
+    assert order.id("PROLIFIC_PID") == "anna"
+    for missing in ("SESSION_ID", "STUDY_ID"):
+        with pytest.raises(DeclinedError, match=f"the person's {missing} is not known; pay by hand"):
+            order.id(missing)
+
+
+def test_a_secret_is_read_without_spaces_around_it_and_refused_if_it_cannot_be_one(monkeypatch):
+    monkeypatch.setenv("PAY_SECRET", "  abc-123 \n")
+    assert secret("PAY_SECRET") == "abc-123"
+    for value, fault in (
+        ("", "is not set"),
+        ("  ", "is not set"),
+        ("käse", "characters"),
+        ("a\tb", "characters"),
+    ):
+        monkeypatch.setenv("PAY_SECRET", value)
+        with pytest.raises(ConfigError, match=fault):
+            secret("PAY_SECRET")
+    monkeypatch.delenv("PAY_SECRET")
+    with pytest.raises(ConfigError, match="PAY_SECRET is not set"):
+        secret("PAY_SECRET")

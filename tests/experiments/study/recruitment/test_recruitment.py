@@ -13,8 +13,9 @@ from experiments.errors import ConfigError, StoreError
 from experiments.study.file import Recruitment, read_people_study
 from experiments.study.recruitment import recruiter
 from experiments.trials.designs import FOLDER
-from experiments.visit.recruiter import InvalidLink, Preview
+from experiments.visit.recruiter import InvalidLink, OpenLink, Preview, WayBack
 from experiments.visit.store import Store
+from experiments.visit.tokens import new_token, token_hash
 from tests.experiments.visit.server.test_server import begin, go_to, phase, play_trial, post, serving
 from tests.scripted_workers import LAST, connected, started, until_phase
 
@@ -62,6 +63,24 @@ def test_people_of_connect_are_known_by_their_id_and_return_to_the_page_with_the
     url = "https://connect.cloudresearch.com/participant/project/DC6CDE9748/complete"
     assert platform.way_back("finished", ids).url == url
     assert platform.way_back("screened_out", ids).gives_back
+
+
+def test_a_link_is_open_to_everybody_and_a_link_to_play_again_carries_the_token_of_the_earlier_visit():
+    earlier = new_token()
+    again, once = OpenLink(repeats=True), OpenLink()
+    assert (again.platform, again.parameters, once.parameters) == ("link", ("after",), ())
+    assert again.arrive({"after": earlier}).identity == {"after": token_hash(earlier)}
+    assert again.arrive({"after": earlier}).key is None
+    for query in ({}, {"after": ""}, {"after": "x"}, {"after": earlier + "x"}, {"before": earlier}):
+        assert again.arrive(query).identity == {}
+    assert once.arrive({"after": earlier}).identity == {}
+
+
+def test_a_code_is_given_for_a_finished_visit_and_in_a_lab_the_next_person_begins():
+    for how in ("finished", "screened_out", "no_consent", "withdrawn", "timed_out"):
+        code = "C0DE" if how == "finished" else ""
+        assert OpenLink("link", "C0DE").way_back(how, {}) == WayBack(code)
+        assert OpenLink("lab", "C0DE").way_back(how, {}) == WayBack(code, "/", label="next_person")
 
 
 SITE = "https://www.example.org"
