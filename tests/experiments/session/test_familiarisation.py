@@ -1,6 +1,7 @@
 """What comes before the task: story, fly-through and training, and what simulated participants know afterwards."""
 
 import dataclasses
+import itertools
 import math
 import re
 from collections import Counter
@@ -18,7 +19,7 @@ from experiments.participants.distribution import Distributions
 from experiments.record.metrics import measure
 from experiments.record.phases import PHASES
 from experiments.record.records import read_events
-from experiments.session.camera_path import SPEED, STEP, bins_seen, camera_path
+from experiments.session.camera_path import BIN_TIME, SPEED, STEP, TURNING, bins_seen, camera_path
 from experiments.session.familiarise import reading_time, story_text, with_names
 from experiments.session.film import write_flythrough
 from experiments.session.film_config import FilmConfig
@@ -73,6 +74,23 @@ def test_the_camera_enters_every_room_and_rests_on_every_bin(house, path):
         offset = bin_.center - path.positions[row]
         assert abs(math.remainder(math.atan2(offset[1], offset[0]) - path.headings[row], math.tau)) < 0.05
         assert abs(math.atan2(offset[2], math.hypot(*offset[:2])) - path.pitches[row]) < 0.05
+
+
+def test_the_camera_turns_once_around_in_each_room_and_shows_its_bins_before_the_next_room(house, path):
+    first = path.bins[: round(math.tau / TURNING / STEP)]
+    assert set(first) == {None}
+    assert path.headings[: len(first) - 20] == pytest.approx(
+        TURNING * STEP * np.arange(1, len(first) - 19), abs=0.15
+    )
+    assert np.abs(path.pitches[: len(first) - 20]).max() < 1e-6
+    shown = [key for key, _ in itertools.groupby(path.bins) if key is not None]
+    assert sorted(shown) == sorted(house.receptacles)
+    assert {path.bins.count(key) for key in shown} == {round(BIN_TIME / STEP)}
+    rooms = [room for room, _ in itertools.groupby(house.catalogue.receptacles[key].room for key in shown)]
+    assert len(rooms) == len(set(rooms))
+    for points in house.viewpoints.values():
+        here = np.linalg.norm(path.positions[:, :2] - points[0], axis=1) < 0.02
+        assert np.ptp(path.headings[here]) > math.tau - 0.1
 
 
 def test_the_camera_moves_smoothly_where_a_person_can_walk(house, path):
