@@ -41,7 +41,8 @@ def write_flythrough(
     whole = camera_path(house)
     duration = seconds or whole.duration
     frames = round(duration * FPS)
-    rows = whole.at(np.linspace(0.0, whole.duration, frames, endpoint=False, dtype=np.float64))
+    # Poses in the middle of each frame. At its beginning, rounding could repeat a pose and skip the next one.
+    rows = whole.at((np.arange(frames) + 0.5) * (whole.duration / frames))
     with replacing(path) as temporary:
         with VideoWriter(temporary, width=film.width, height=film.height, fps=FPS) as video:
             _draw(house, rows, film, video, on_progress)
