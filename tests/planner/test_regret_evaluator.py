@@ -1,6 +1,7 @@
 """Compare the regrets of visits with regrets that are computed anew, and with lengths of tours."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from planning_cases import Task, optimum, two_rooms
 
 from planner.exact.solver import ExactSolver
 from planner.exact.task_search import TaskSearch
-from planner.plan import Visit, VisitKind
+from planner.plan import Status, Visit, VisitKind
 from planner.regret import RegretEvaluator, regrets
 from planner.solvers import SolveLimit, solver
 from planner.task_problems import TaskProblems
@@ -110,6 +111,57 @@ def test_what_is_impossible_or_not_proven_has_no_regret(geodesics):
     assert evaluator.of(task.state, Visit(VisitKind.PLACE, "object_00")) is None
     hard = [evaluator.of(task.state, stop) for stop in possible(task)]
     assert None in hard
+
+
+@pytest.mark.parametrize(
+    (
+        "before",
+        "rest",
+        "bounds",
+    ),  # cost, lower bound and whether the plan is proven, in metres; rest without the leg
+    [
+        ((20.0, 20.0, True), (21.5, 21.5, True), (1.5, 1.5, 1.5)),
+        (
+            (20.0, 20.0, True),
+            (20.0 - 1e-9, 20.0 - 1e-9, True),
+            (0.0, 0.0, 0.0),
+        ),  # the rounding of two searches
+        ((20.0, 19.0, False), (21.5, 21.5, True), (1.5, 2.5, None)),
+        ((20.0, 20.0, True), (21.5, 20.5, False), (0.5, 1.5, None)),
+        ((20.0, 18.0, False), (21.5, 20.5, False), (0.5, 3.5, None)),
+        ((20.0, 18.0, False), (19.5, 19.0, False), (0.0, 1.5, None)),
+        ((20.0, 18.0, False), (22.0, 15.0, False), (0.0, 4.0, None)),
+    ],
+)
+def test_bounds_follow_from_the_plans_before_and_after_a_visit(geodesics, monkeypatch, before, rest, bounds):
+    task = Task(geodesics, 5, 1)
+    problem, (first, other, *_) = TaskProblems(geodesics).problem(task.state), possible(task)
+    leg = float(problem.distances[problem.start, problem.location(other)])
+
+    def plan(values, visit):
+        cost, lower, proven = values
+        return SimpleNamespace(
+            visits=(visit,),
+            cost=cost,
+            lower_bound=lower,
+            status=Status.OPTIMAL if proven else Status.FEASIBLE,
+        )
+
+    def solve(_, asked):
+        if len(asked.shipments) == 5:
+            return plan(before, first)
+        return plan((rest[0] - leg, rest[1] - leg, rest[2]), None)
+
+    monkeypatch.setattr(RegretEvaluator, "_solve", solve)
+    evaluator = RegretEvaluator(geodesics, solver=SEARCH)
+    found = evaluator.bounds(task.state, other)
+    assert (found.lower, found.upper) == pytest.approx(bounds[:2])
+    assert found.lower >= 0.0 and found.upper >= found.lower
+    assert found.exact == (None if bounds[2] is None else pytest.approx(bounds[2]))
+    assert found.exact is None or found.exact >= 0.0
+    own = evaluator.bounds(task.state, first)
+    gap = before[0] - before[1]
+    assert (own.lower, own.upper, own.exact) == (0.0, pytest.approx(gap), 0.0 if before[2] else None)
 
 
 def test_nothing_left_is_nothing_to_judge(geodesics):

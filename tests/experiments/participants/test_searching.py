@@ -10,7 +10,7 @@ from experiments.participants.base import FAR, Percept, estimated_distances
 from experiments.participants.frontier import SHIFT, Frontier, free_length
 from experiments.participants.nearest import Nearest
 from experiments.participants.searcher import Searcher
-from mjsim.values.actions import WAIT, FollowPath, Move, Pick, Place
+from mjsim.values.actions import IDLE, WAIT, FollowPath, Move, Pick, Place
 from mjsim.values.observation import Observation
 
 
@@ -140,6 +140,17 @@ def test_a_searcher_turns_around_at_each_place_of_a_room_and_then_goes_to_the_ne
         )
         assert sum(isinstance(turn, Move) and turn.turn > 0.0 for turn in turns) >= 12
     assert rooms[:-1] == ["bedroom"] * len(house.viewpoints["bedroom"]) and rooms[-1] != "bedroom"
+
+
+def test_a_turn_that_a_find_interrupts_is_begun_anew(house):
+    here = place_in(house, "bedroom")
+    script = searcher(house, here, "cup", "mug")
+    assert [isinstance(script.act(heading=angle), Move) for angle in (0.0, 2.0, 4.0)] == [True] * 3
+    assert script.aim({"cup": here + 1.0}) == Pick("cup")
+    assert script.aim(carried=("cup",)) == Place("cup")
+    turns = [script.act(carried=(), heading=angle, seconds=0.1) for angle in np.arange(1.0, 7.0, 0.5)]
+    assert all(isinstance(turn, Move) and turn.turn > 0.0 for turn in turns)
+    assert script.act(heading=7.5, seconds=0.1) == IDLE
 
 
 def test_nearest_turns_to_find_flagpoles_and_makes_the_nearest_visit_until_it_is_impossible(house):

@@ -15,7 +15,7 @@ from experiments.record.columns import decode_action
 from experiments.record.files import CHECKSUMS, read_json, save_arrays, write_checksums
 from experiments.record.journal import Header, Journal, read_entries
 from experiments.record.reader import read_journal
-from experiments.record.records import EPISODE, EVENTS, METRICS, EventLog, read_events
+from experiments.record.records import EPISODE, EVENTS, METRICS, RECORDING, EventLog, read_events
 from experiments.record.run_directory import run_directory
 from experiments.record.verify import checksum_mismatches, damage
 from experiments.record.writer import RecordWriter
@@ -176,18 +176,52 @@ def test_an_event_that_was_written_wrongly_is_found_with_its_line_and_step():
     assert found.message.startswith("line 1: events.jsonl has an invalid event")
 
 
-def test_a_changed_line_of_the_log_is_named_with_the_step_in_which_it_was_written():
+def logged_in_each_step(steps=6):
+    """A record in which an event is logged after each control step but the last one, and its log line by line."""
     writer = new_writer()
     writer.log.append(0.0, "start", episode_sha256="", objects=2, order=["b", "a"])
-    for step in range(6):
+    for step in range(steps):
         writer.append(observation(step * 0.04), HealthSample(), step, Steps(Move()))
-        if step == 3:
-            writer.log.append(0.16, "picked", object="b", receptacle=None)
+        if step < steps - 1:
+            writer.log.append(step * 0.04 + 0.04, "picked", object=f"b{step}", receptacle=None)
     record = writer.record()
-    changed = dataclasses.replace(record, log=record.log.replace(b'"object": "b"', b'"object": "c"'))
+    return record, record.log.splitlines(keepends=True)
+
+
+@pytest.mark.parametrize("line", range(6))
+def test_a_changed_line_of_the_log_is_named_with_the_step_in_which_it_was_written(line):
+    record, lines = logged_in_each_step()
+    assert record.steps_of_events[line] == max(0, line - 1)
+    lines[line] = lines[line].replace(b'"event"', b'"Event"')
+    changed = dataclasses.replace(record, log=b"".join(lines))
     assert changed.log != record.log
     [found] = [m for m in damage(changed) if "not as written" in m.message]
-    assert (found.step, found.message) == (3, "events.jsonl is not as written, at line 2")
+    assert (found.step, found.file) == (max(0, line - 1), EVENTS)
+    assert found.message == f"events.jsonl is not as written, at line {line + 1}"
+
+
+@pytest.mark.parametrize("kept", range(1, 6))
+def test_a_log_that_was_cut_off_is_named_with_the_first_step_of_which_it_lacks_events(kept):
+    record, lines = logged_in_each_step()
+    assert damage(dataclasses.replace(record, log=b"".join(lines)))[0].message.startswith("line 1"), (
+        "nothing but the start is wrong in the whole log"
+    )
+    short = dataclasses.replace(record, log=b"".join(lines[:kept]))
+    [found] = [m for m in damage(short) if "truncated" in m.message]
+    assert (found.step, found.file) == (max(0, kept - 1), EVENTS)
+
+
+def test_a_log_that_continues_or_whose_sizes_go_backwards_is_named():
+    record, lines = logged_in_each_step()
+    longer = dataclasses.replace(record, log=record.log + lines[-1])
+    [found] = [m for m in damage(longer) if "continues" in m.message]
+    assert (found.step, found.file) == (5, EVENTS)
+    for row in range(1, 6):
+        sizes = record.recording["log_size"].copy()
+        sizes[row] = sizes[row - 1] - 1
+        shrunk = dataclasses.replace(record, recording={**record.recording, "log_size": sizes})
+        [found] = [m for m in damage(shrunk) if "backwards" in m.message]
+        assert (found.step, found.file) == (row - 1, RECORDING)
 
 
 def test_files_that_are_missing_changed_or_added_after_a_run_are_named(tmp_path):
