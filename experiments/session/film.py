@@ -42,7 +42,7 @@ def write_flythrough(
     duration = seconds or whole.duration
     frames = round(duration * FPS)
     # Poses in the middle of each frame. At its beginning, rounding could repeat a pose and skip the next one.
-    rows = whole.at((np.arange(frames) + 0.5) * (whole.duration / frames))
+    rows = whole.at((np.arange(frames, dtype=np.float64) + 0.5) * (whole.duration / frames))
     with replacing(path) as temporary:
         with VideoWriter(temporary, width=film.width, height=film.height, fps=FPS) as video:
             _draw(house, rows, film, video, on_progress)
