@@ -59,6 +59,27 @@ def test_distributions_are_those_of_statistics(share, first, spread):
         )
 
 
+@pytest.mark.parametrize("scale", [1.0, 0.5, 8.0])
+@pytest.mark.parametrize(
+    ("share", "value"),
+    [
+        (0.0, 0.0),
+        (0.125, 0.5),
+        (0.2499, 0.9996),
+        (0.2501, 5.0),
+        (0.4999, 5.0),
+        (0.5, 10.0),
+        (0.75, 10.5),
+        (1.0, 11.0),
+    ],
+)
+def test_a_share_of_a_mixture_selects_a_component_by_its_weight_and_a_value_in_it(share, value, scale):
+    """Weights count relative to their sum, and components without weight are never selected."""
+    parts = [[0.25, {"uniform": [0.0, 1.0]}], [0.0, 7.0], [0.25, 5.0], [0.5, {"uniform": [10.0, 11.0]}]]
+    spread = distribution("reach", {"mixture": [[scale * weight, part] for weight, part in parts]})
+    assert spread.quantile(share) == pytest.approx(value, abs=1e-9)
+
+
 @given(
     st.sampled_from(
         [

@@ -1,14 +1,18 @@
 """The HTTP client of recruitment platforms: when it repeats a request, and which outcomes it knows for certain."""
 
 import asyncio
+import os
+from datetime import timedelta
 
 import httpx
 import pytest
 
 from experiments.errors import ConfigError
+from experiments.study.file import Recruitment
 from experiments.study.payments.platform import (
     LONGEST_WAIT,
     MAX_TEXT,
+    TIMEOUT,
     TOO_MANY,
     TRIES,
     Api,
@@ -18,6 +22,12 @@ from experiments.study.payments.platform import (
     UnsureError,
     secret,
 )
+from experiments.study.recruitment.connect import ConnectPayer
+from experiments.study.recruitment.external_question import ExternalQuestionPayer
+from experiments.study.recruitment.prolific import ProlificPayer
+from experiments.visit.store.ledger import IN_DOUBT_AFTER
+
+PAYERS = (ProlificPayer, ConnectPayer, ExternalQuestionPayer)
 
 
 def asked(monkeypatch, headers, busy):
@@ -162,3 +172,28 @@ def test_a_secret_is_read_without_spaces_around_it_and_refused_if_it_cannot_be_o
     monkeypatch.delenv("PAY_SECRET")
     with pytest.raises(ConfigError, match="PAY_SECRET is not set"):
         secret("PAY_SECRET")
+
+
+def test_a_request_is_over_long_before_another_process_may_repeat_it():
+    longest, later = TRIES * TIMEOUT + (TRIES - 1) * LONGEST_WAIT, IN_DOUBT_AFTER.total_seconds()
+    assert (longest, later) == (300.0, 600.0)
+
+
+def test_platforms_say_how_late_their_lists_are_and_how_long_a_reason_must_be():
+    found = {payer.__name__: (payer.listed_after, payer.shortest_reason) for payer in PAYERS}
+    assert found == {
+        "ProlificPayer": (timedelta(hours=1), 100),
+        "ConnectPayer": (timedelta(minutes=10), 1),
+        "ExternalQuestionPayer": (timedelta(minutes=10), 1),
+    }
+
+
+def test_a_payer_needs_the_secret_of_its_platform_and_where_its_interface_is(monkeypatch):
+    for name in [name for name in os.environ if name.startswith("MJSIM_")]:
+        monkeypatch.delenv(name)
+    site = "https://api.example.org"
+    for payer in PAYERS:
+        with pytest.raises(ConfigError, match="is not set in the environment"):
+            payer(Recruitment(platform="prolific", api_url=site))
+    with pytest.raises(ConfigError, match="api_url is empty"):
+        ExternalQuestionPayer(Recruitment(platform="external-question"))
