@@ -17,8 +17,8 @@ from experiments.trials.setup import prepare_session, prepared_planner, regret_e
 from experiments.trials.trial_config import TrialConfig
 from mjsim.house.scene.scene import compose
 from planner.exact.solver import ExactSolver
-from planner.plan import Visit, VisitKind
-from planner.regret import RegretEvaluator
+from planner.plan import Status, Visit, VisitKind
+from planner.regret import RegretBounds, RegretEvaluator
 from planner.service import Planner
 from planner.solvers import SolveLimit
 
@@ -133,3 +133,77 @@ def test_the_bound_of_a_walk_saves_the_reach_on_both_ways_but_the_last(x, y):
     saved = 2 * (2 * 0.9 + 2 * place) - place
     assert reach_bound(30.0, house, episode) == pytest.approx(30.0 - saved)
     assert reach_bound(1.0, house, episode) == 0.0
+
+
+def route(*visits, cost=9.1234567, bound=8.7654321, status=Status.FEASIBLE):
+    plan = SimpleNamespace(cost=cost, lower_bound=bound, status=status)
+    return SimpleNamespace(plan=plan, visits=visits, next=visits[0] if visits else None)
+
+
+FIRST, SECOND = Visit(PICK, "cup"), Visit(PICK, "duck")
+
+
+@pytest.mark.parametrize(
+    ("before", "better", "differs"),
+    [
+        (route(FIRST, SECOND), None, False),
+        (route(FIRST, SECOND), route(FIRST, SECOND), False),
+        (route(FIRST, SECOND), route(SECOND, FIRST), True),
+        (None, route(FIRST), True),
+    ],
+)
+def test_a_better_plan_is_logged_as_such_and_says_whether_its_visits_differ(before, better, differs):
+    planner, log = SimpleNamespace(route=before, improve=lambda _: better), EventLog()
+    task = TaskLog(planner, log, None, None, capacity=2, regrets=False)
+    assert task.improve(2.5, None) == differs
+    expected = {"event": "plan", "t": 2.5, "cost_m": 9.123457, "lower_bound_m": 8.765432, "improved": True}
+    expected["status"] = "feasible"
+    if better is None:
+        assert log.events == []
+    else:
+        assert log.events == [{**expected, "visits": [["pick", visit.object] for visit in better.visits]}]
+
+
+def test_regrets_that_were_late_are_logged_with_their_visit_and_bounds_are_rounded_outwards():
+    found = [
+        ((3, ("regret",)), RegretBounds(1.23456789, 1.23456789, 1.23456789)),
+        ((4, ("regret", "suggested_regret")), RegretBounds(0.10000049, 2.00000011, None)),
+        ((5, ("suggested_regret",)), None),
+    ]
+    log = EventLog()
+    TaskLog(SimpleNamespace(finish=lambda: found), log, None, None, capacity=2, regrets=True).finish(7.0)
+    bounds = [0.1, 2.000001]
+    assert [{k: v for k, v in e.items() if k not in ("event", "t")} for e in log.events] == [
+        {"visit": 3, "regret_m": 1.234568},
+        {
+            "visit": 4, "regret_m": None, "regret_bounds_m": bounds,
+            "suggested_regret_m": None, "suggested_regret_bounds_m": bounds,
+        },
+        {"visit": 5, "suggested_regret_m": None},
+    ]  # fmt: skip
+    assert {(event["event"], event["t"]) for event in log.events} == {("regret", 7.0)}
+
+
+@pytest.mark.parametrize(
+    ("made", "planned", "status", "judged"),
+    [
+        (FIRST, FIRST, Status.OPTIMAL, []),
+        (SECOND, FIRST, Status.OPTIMAL, [(SECOND, ("regret",))]),
+        (FIRST, FIRST, Status.FEASIBLE, [(FIRST, ("regret", "suggested_regret"))]),
+        (SECOND, FIRST, Status.FEASIBLE, [(SECOND, ("regret",)), (FIRST, ("suggested_regret",))]),
+        (FIRST, None, None, [(FIRST, ("regret", "suggested_regret"))]),
+    ],
+)
+def test_a_suggestion_of_a_proven_plan_has_no_regret_and_all_else_is_judged(made, planned, status, judged):
+    asked = []
+
+    def judge(visit, key):
+        asked.append((visit, key[1]))
+        assert key[0] == 6
+        return RegretBounds(1.5, 1.5, 1.5)
+
+    task = TaskLog(SimpleNamespace(judge=judge), EventLog(), None, None, capacity=2, regrets=True)
+    fields = task._regrets_of(6, made, None if planned is None else route(planned, status=status))
+    assert asked == judged
+    names = {name for _, keys in judged for name in keys}
+    assert fields == {f"{name}_m": 1.5 if name in names else 0.0 for name in ("regret", "suggested_regret")}
