@@ -7,11 +7,21 @@ import pytest
 
 from experiments.errors import ConfigError
 from experiments.session import film
-from experiments.session.camera_path import STEP, CameraPath, camera_path
+from experiments.session.camera_path import (
+    BIN_DISTANCES,
+    EYE_HEIGHT,
+    SPEED,
+    STEP,
+    CameraPath,
+    _Camera,
+    camera_path,
+)
 from experiments.session.film import FPS, write_flythrough
 from experiments.session.film_config import FilmConfig
-from mjsim.house.sight.sight import FieldOfView
+from mjsim.house.compiled.house import compiled_house
+from mjsim.house.sight.sight import FieldOfView, visible_receptacles
 from mjsim.values.person_parameters import PersonParameters
+from mjsim.world.walking.polyline import path_length, point_along
 
 SMALL = FilmConfig(320, 240, "draft")
 
@@ -111,6 +121,43 @@ def test_a_film_of_another_length_shows_the_whole_path_faster_or_slower(house, d
     assert positions == pytest.approx(path.positions[rows])
     with pytest.raises(ConfigError, match="too short; it needs at least 1 s"):
         write_flythrough(house, tmp_path / "short.mp4", SMALL, seconds=0.99)
+
+
+def test_the_walking_camera_looks_level_along_its_way_and_turns_into_it_before_it_walks(house):
+    path = camera_path(house)
+    moves = np.diff(path.positions[:, :2], axis=0)
+    walks = np.linalg.norm(moves, axis=1) > 0.7 * SPEED * STEP
+    gaze = path.headings[:-1]
+    off = [math.remainder(h - math.atan2(dy, dx), math.tau) for h, (dx, dy) in zip(gaze, moves, strict=True)]
+    assert walks.sum() > 500
+    assert np.abs(off)[walks].max() < 0.6 and np.median(np.abs(off)[walks]) < 0.1
+    assert np.abs(path.pitches[:-1][walks]).max() < 0.1
+    assert np.linalg.norm(moves, axis=1).sum() < 1.1 * 0.04 * walks.sum() * SPEED
+
+
+def test_each_bin_is_shown_from_the_farthest_of_its_distances_from_which_it_is_visible(house):
+    path, compiled = camera_path(house), compiled_house(house.catalogue)
+    field = FieldOfView.of(PersonParameters())
+    for key, bin_ in house.receptacles.items():
+        middle = house.viewpoints[house.catalogue.receptacles[key].room][0]
+        way = np.array(house.geodesics.shortest_path(middle, house.approaches[key]).points)
+        for distance in BIN_DISTANCES:
+            place = np.array(point_along(way, max(0.0, path_length(way) - distance)))
+            eye = np.array([*place, EYE_HEIGHT])
+            ahead, left, up = (bin_.center - eye).tolist()
+            gaze = math.atan2(left, ahead), math.atan2(up, math.hypot(ahead, left))
+            if visible_receptacles(compiled.model, compiled.data, {key: bin_}, eye, *gaze, field=field):
+                break
+        rest = path.positions[path.bins.index(key) + 25, :2]
+        assert rest == pytest.approx(place, abs=0.01)
+
+
+@pytest.mark.parametrize("left", [0, 1])
+def test_a_camera_that_is_already_there_does_not_move(house, left):
+    start = np.array(house.viewpoints["living_room"][0])
+    camera = _Camera(house, start)
+    camera.move(start + np.array([0.0, 1e-8 * left]))
+    assert (camera.rows, camera.bins) == ([], [])
 
 
 def test_a_path_is_read_at_any_time_up_to_its_end():
