@@ -1,5 +1,6 @@
 """Signals in the middle of a run and of a batch: the record is kept, says how it ended, and replays."""
 
+import asyncio
 import os
 import signal
 import subprocess
@@ -16,7 +17,7 @@ from experiments.record import records
 from experiments.record.files import read_json
 from experiments.record.records import read_events
 from experiments.record.writer import RecordWriter
-from experiments.session.signals import Stopped, signals_postponed, signals_raised
+from experiments.session.signals import Stopped, run_until_signal, signals_postponed, signals_raised
 from experiments.trials.replay.replay import replay
 from experiments.trials.trial import run_trial
 from faults.conftest import BRIEF, FAST, ROOT, one_line
@@ -116,6 +117,39 @@ def test_a_signal_that_comes_while_compiled_code_returns_is_named(monkeypatch, c
     monkeypatch.setattr("experiments.cli.main._run", interrupted)
     assert main(["doctor"]) == 128 + signal.SIGTERM
     assert "stopped by SIGTERM" in one_line(capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_cancels_a_coroutine_which_cleans_up_and_is_then_raised(number):
+    steps = []
+
+    async def work():
+        try:
+            os.kill(os.getpid(), number)
+            await asyncio.sleep(30.0)
+        finally:
+            os.kill(os.getpid(), signal.SIGTERM)  # a second signal does not interrupt the cleanup
+            await asyncio.sleep(0.01)
+            steps.append("cleaned up")
+
+    before = signal.getsignal(number)
+    with pytest.raises(Stopped) as stopped:
+        run_until_signal(work())
+    assert str(stopped.value) == str(Stopped(number))
+    assert steps == ["cleaned up"]
+    assert signal.getsignal(number) is before
+
+
+def test_a_coroutine_without_a_signal_returns_its_result_or_raises_its_own_error():
+    async def result(value):
+        return value
+
+    async def cancelled():
+        raise asyncio.CancelledError
+
+    assert run_until_signal(result(7)) == 7
+    with pytest.raises(asyncio.CancelledError):
+        run_until_signal(cancelled())
 
 
 def test_an_ignored_signal_stays_ignored():
