@@ -163,3 +163,29 @@ def test_regrets_can_be_given_up():
     stop.set()
     found = regrets(random_problem(1, 12), PASS, limit=SolveLimit(stop=stop))
     assert len(found) == 12
+
+
+@pytest.mark.parametrize(
+    ("radius", "succeeds", "passes"),
+    [
+        (1.0, 9, [1.0, 0.5, 0.25, 0.125]),
+        (1.0, 2, [1.0, 0.5, 0.25]),
+        (0.2, 9, [0.2, 0.1]),
+        (0.05, 9, [0.05]),
+    ],
+)
+def test_a_pass_that_is_too_large_is_repeated_with_half_the_radius_down_to_a_tenth_of_a_metre(
+    monkeypatch, radius, succeeds, passes
+):
+    problem = random_problem(1, 9)
+    plan, tried = PASS.solve(problem), []
+    best = tour_length(problem, plan.visits, problem.integers.metric)
+
+    def attempt(*args):
+        tried.append(round((args[3] - best) * problem.integers.unit, 6))
+        return costs_by_pass(*args) if len(tried) > succeeds else (None, 7)
+
+    monkeypatch.setattr(regret, "costs_by_pass", attempt)
+    found = regrets(problem, PASS, radius=radius, plan=plan)
+    assert tried == pytest.approx(passes, abs=1e-3)
+    assert {one.proven for one in found} == {len(passes) > succeeds}
