@@ -142,7 +142,7 @@ def test_a_searcher_turns_around_at_each_place_of_a_room_and_then_goes_to_the_ne
     assert rooms[:-1] == ["bedroom"] * len(house.viewpoints["bedroom"]) and rooms[-1] != "bedroom"
 
 
-def test_a_turn_that_a_find_interrupts_is_begun_anew(house):
+def test_a_turn_that_a_find_interrupts_starts_again(house):
     here = place_in(house, "bedroom")
     script = searcher(house, here, "cup", "mug")
     assert [isinstance(script.act(heading=angle), Move) for angle in (0.0, 2.0, 4.0)] == [True] * 3

@@ -171,7 +171,7 @@ def fail(error):
         ("the end", RecordError("disk full")),
     ],
 )
-def test_a_trial_whose_film_fails_goes_on_without_a_film_and_its_file(
+def test_a_trial_whose_film_fails_continues_without_a_film_and_its_file(
     house, scene, drawn, begun, tmp_path, monkeypatch, step, error
 ):
     world, observation, state = begun

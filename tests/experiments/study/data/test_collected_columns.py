@@ -94,7 +94,7 @@ def test_free_texts_are_those_of_the_survey_by_people_whose_data_are_kept():
     given = [
         answer("comments", "one"),
         answer("job", "two", person=12),
-        answer("comments", "of somebody who is left out", person=8),
+        answer("comments", "of an excluded participant", person=8),
         answer("comments", "a draft", final=False),
         answer("comments", "elsewhere", "story"),
         answer("hand", "left"),

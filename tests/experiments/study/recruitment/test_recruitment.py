@@ -65,7 +65,7 @@ def test_people_of_connect_are_known_by_their_id_and_return_to_the_page_with_the
     assert platform.way_back("screened_out", ids).gives_back
 
 
-def test_a_link_is_open_to_everybody_and_a_link_to_play_again_carries_the_token_of_the_earlier_visit():
+def test_a_link_is_open_to_all_and_a_link_to_play_again_carries_the_token_of_the_earlier_visit():
     earlier = new_token()
     again, once = OpenLink(repeats=True), OpenLink()
     assert (again.platform, again.parameters, once.parameters) == ("link", ("after",), ())
