@@ -164,6 +164,25 @@ def test_bounds_follow_from_the_plans_before_and_after_a_visit(geodesics, monkey
     assert (own.lower, own.upper, own.exact) == (0.0, pytest.approx(gap), 0.0 if before[2] else None)
 
 
+def test_regrets_of_all_visits_answer_for_each_of_them_and_for_none_that_is_impossible(
+    geodesics, monkeypatch
+):
+    task = Task(geodesics, 6, 4)
+    evaluator = RegretEvaluator(geodesics)
+    found = evaluator.all(task.state)
+
+    def solved(*_):
+        raise AssertionError("the regrets are known")
+
+    monkeypatch.setattr("planner.regret.TaskTable.costs", solved)
+    monkeypatch.setattr(RegretEvaluator, "_solve", solved)
+    for visit, regret in found.items():
+        bounds = evaluator.bounds(task.state, visit)
+        assert (bounds.lower, bounds.upper, bounds.exact) == (regret.regret,) * 3
+    assert evaluator.of(task.state, Visit(VisitKind.PLACE, possible(task)[0].object)) is None
+    assert evaluator.bounds(task.state, Visit(VisitKind.PICK, "nothing")) is None
+
+
 def test_nothing_left_is_nothing_to_judge(geodesics):
     assert RegretEvaluator(geodesics).all(Task(geodesics, 0).state) == {}
 
