@@ -78,7 +78,8 @@ def test_a_state_is_restored_and_one_of_other_objects_is_refused(state):
     health = object()  # the monitor restores it
     state.picked(1.0, RIGHT, 1, True)
     details = state.details(health)
-    assert details == StateDetails((None, "o1"), (LOOSE, CARRIED, LOOSE), health, None)
+    assert (details.hands, details.status) == ((None, "o1"), (LOOSE, CARRIED, LOOSE))
+    assert details.health is health and details.person is None
     state.picked(2.0, LEFT, 0, True)
     held = state.held
     state.restore(details)

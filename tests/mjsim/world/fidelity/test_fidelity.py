@@ -234,6 +234,18 @@ def test_a_walk_without_physics_goes_where_the_physics_goes(hall, turns, left):
     assert arrivals[0] == pytest.approx(arrivals[1], rel=0.01)
 
 
+@tiers
+def test_the_velocity_that_is_observed_is_that_of_the_position_in_the_house(hall, fidelity):
+    world = world_of(hall, fidelity)
+    for _ in range(30):
+        before = world.observation()
+        after = world.step(Move(forward=1.0, left=0.4, turn=0.5)).observation
+        change = (after.position - before.position) / (after.time - before.time)
+        assert after.velocity.shape == (2,)
+        assert after.velocity == pytest.approx(change, abs=0.12)
+    assert np.hypot(*after.velocity) == pytest.approx(math.hypot(1.0, 0.4), abs=0.05)
+
+
 @pytest.fixture(scope="module")
 def floor(house_model):
     return Floor.of(house_model, PersonParameters().body_radius)
