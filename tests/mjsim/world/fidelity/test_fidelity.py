@@ -235,6 +235,25 @@ def test_a_walk_without_physics_goes_where_the_physics_goes(hall, turns, left):
 
 
 @tiers
+@pytest.mark.parametrize("at_once", [True, False])
+def test_a_motion_is_reported_with_the_time_at_the_beginning_of_its_last_step(house, fidelity, at_once):
+    world, reported = world_of(house, fidelity), []
+    walk_to(world, 1.0, 2.4, within=0.1)
+    for action in (Pick("o0"), None, Place("o0")):
+        if action is None:
+            walk_to(world, 0.9, 3.0)
+            face(world, 0.3, 3.7)
+            continue
+        step = world.step(action)
+        while world.busy:
+            step = world.step(WAIT if at_once else Move())
+        (event,) = step.events
+        assert event.time == pytest.approx(step.observation.time - world.control_timestep)
+        reported.append((event.kind, event.object, event.receptacle))
+    assert reported == [(EventKind.PICKED, "o0", None), (EventKind.PLACED, "o0", "crate")]
+
+
+@tiers
 def test_the_velocity_that_is_observed_is_that_of_the_position_in_the_house(hall, fidelity):
     world = world_of(hall, fidelity)
     for _ in range(30):
