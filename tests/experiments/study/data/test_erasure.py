@@ -122,6 +122,20 @@ def test_nobody_is_erased_whose_runs_cannot_be_deleted(served, tmp_path, monkeyp
     assert traces(tmp_path, "bert-PID", "b" * 64) == []
 
 
+def test_a_person_who_is_owed_money_is_paid_first_but_others_can_be_erased(served, tmp_path, capsys):
+    async def decide():
+        store = await _open(served)
+        await store.ledger.decide(1, "reward", 750, "USD", "p00001-reward", "finished")
+        await store.close()
+
+    asyncio.run(decide())
+    assert main(["study", "erase", *served, "p00001", "--who", "me"]) == 2
+    assert "p00001 is owed p00001-reward: pay first, then erase" in capsys.readouterr().err
+    assert traces(tmp_path / "served", "anna-PID") and traces(tmp_path / "table", "anna-wrote")
+    assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 0
+    assert traces(tmp_path, "bert-PID") == []
+
+
 def test_nothing_is_said_about_files_that_do_not_contain_the_person(served, tmp_path, capsys):
     async def arrive():
         store = await _open(served)
