@@ -36,6 +36,7 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.visit import Again, Phase, Visitor
 from experiments.visit.phases import phases_of
+from experiments.visit.server.admission import NEW_PEOPLE
 from hud.conditions import CONDITIONS, OPTIONS, condition
 from hud.task import TaskView
 from mjsim.house.catalogue.catalogue import Catalogue
@@ -184,6 +185,12 @@ def test_the_table_of_a_page_lists_every_parameter_with_its_default_and_range(na
         (row,) = [line for line in page(name).splitlines() if line.startswith(f"| `{key}` |")]
         bounds = f"{short(parameter.lowest)} to {short(parameter.highest)}"
         assert f"| {in_words(parameter.usual)} | {bounds} | {parameter.unit} |" in row
+
+
+def test_the_study_page_names_the_limit_of_new_participants():
+    count, period = NEW_PEOPLE
+    assert period == 60.0
+    assert f"From one IP address, {count} new participants can begin per minute." in page("study.md")
 
 
 def test_the_examples_of_the_pages_describe_behaviour_and_people():

@@ -5,8 +5,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from experiments.analysis.study.measures import SurveyScale
 from experiments.errors import ConfigError, RecordError
 from experiments.study.data.collect import (
+    Collected,
     _about,
     _answers,
     _complete,
@@ -15,7 +17,9 @@ from experiments.study.data.collect import (
     person_name,
     person_number,
     visit_name,
+    write_collected,
 )
+from experiments.trials.table import read_rows
 from experiments.visit.store import Answer, PhaseRow, TrialRow
 from experiments.visit.texts.items import Item
 
@@ -170,3 +174,19 @@ def test_simulated_and_real_people_are_never_mixed(rehearsal, platforms, fault):
         return
     with pytest.raises(RecordError, match=fault):
         check_people(study, people)
+
+
+@pytest.mark.parametrize("survey", [None, SurveyScale(7, {"useful": "It was useful."})])
+def test_tables_are_written_into_a_new_private_folder_and_over_those_of_before(tmp_path, survey):
+    out = tmp_path / "new" / "tables"
+    for name in ("p00001", "p00002"):
+        rows, texts = [{"participant": name, "time": 1.5}], [(name, "comments", "=1+1")]
+        written = write_collected(Collected(rows, texts, {}, {}, survey), out)
+    assert {path.name for path in written} == {"trials.parquet", "trials.csv", "texts.csv"}
+    assert out.stat().st_mode & 0o777 == 0o700
+    assert {path.stat().st_mode & 0o777 for path in written} == {0o600}
+    assert [row["participant"] for row in read_rows(out / "trials.parquet")] == ["p00002"]
+    assert (out / "texts.csv").read_text() == "participant,item,text\np00002,comments,'=1+1\n"
+    assert (out / "survey.json").exists() == (survey is not None)
+    assert (out / "copies.jsonl").read_bytes() == b""
+    assert (out / "copies.jsonl").stat().st_mode & 0o777 == 0o600
