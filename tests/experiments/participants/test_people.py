@@ -122,6 +122,7 @@ def test_people_stay_within_their_limits_and_describing_more_changes_nothing_els
         ("{reach = {normal = [1.0, 0.0]}}", "reach: the standard deviation of normal must be positive"),
         ("{reach = {gamma = [1.0, 0.1]}}", "reach.gamma: Expected `float`, got `array`"),
         ("{reach = {normal = [1.0, 0.1], mean = 1.0}}", "reach: Object contains unknown field `mean`"),
+        ("{reach = {mixture = [[-0.5, 1.0], [1.0, 1.1]]}}", "reach: Expected `float` >= 0.0"),
         ("{reach = {uniform = [1.1, 0.9]}}", "reach: uniform takes the lowest value, then the highest"),
         ("{reach = {normal = [9.0, 0.1]}}", r"reach: normal = .* has no values from 0\.6 to 1\.5"),
         ("{reach = {normal = [1.0, 0.1], min = 1.2, max = 1.1}}", "reach: min must not exceed max"),

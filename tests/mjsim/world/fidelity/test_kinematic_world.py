@@ -17,6 +17,7 @@ from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.body.grips import AWAKE
 from mjsim.world.body.rig import HEADING, X, Y
+from mjsim.world.body.slots import object_corners
 from mjsim.world.fidelity.event import ActiveMotion
 from mjsim.world.fidelity.kinematic_steps import (
     BODY,
@@ -76,6 +77,19 @@ def test_a_held_object_is_where_body_hand_and_grip_put_it(
     assert state.poses[item] == pytest.approx(composed(composed(body, held), grip), abs=1e-12)
     assert (np.delete(state.poses, item, axis=0) == 9.0).all()
     assert [held_in(state.vector, side) for side in (hand, 1 - hand)] == [item, -1]
+
+
+@pytest.mark.parametrize("grip", avatar.GRIPS)
+@pytest.mark.parametrize("item", range(3))
+def test_a_load_reaches_as_far_from_the_hand_as_its_corners(scene, item, grip):
+    """Its corners are those of the object in the pose of the grip, which decides where it fits into a bin."""
+    planner = world_of(scene, "event")._tier._planner
+    corners = object_corners(scene.model, scene.index.geoms(scene.index.names[item]))
+    pose = planner._kinematic.model.grips[item, grip]
+    expected = [composed(pose, np.array([*corner, 1.0, 0.0, 0.0, 0.0]))[:3] for corner in corners]
+    found = planner._corners_about_hand(item, grip)
+    assert found == pytest.approx(np.array(expected), abs=1e-12)
+    assert (np.ptp(found, axis=0) > 0.05).all()
 
 
 def test_a_hash_depends_on_every_number_and_on_its_place():
