@@ -147,7 +147,7 @@ def test_bounds_follow_from_the_plans_before_and_after_a_visit(geodesics, monkey
             status=Status.OPTIMAL if proven else Status.FEASIBLE,
         )
 
-    def solve(_, asked):
+    def solve(_, asked, _before):
         if len(asked.shipments) == 5:
             return plan(before, first)
         return plan((rest[0] - leg, rest[1] - leg, rest[2]), None)

@@ -199,11 +199,11 @@ def test_a_suggestion_of_a_proven_plan_has_no_regret_and_all_else_is_judged(made
 
     def judge(visit, key):
         asked.append((visit, key[1]))
-        assert key[0] == 6
+        assert key[0] == 0  # number of the visit
         return RegretBounds(1.5, 1.5, 1.5)
 
     task = TaskLog(SimpleNamespace(judge=judge), EventLog(), None, None, capacity=2, regrets=True)
-    fields = task._regrets_of(6, made, None if planned is None else route(planned, status=status))
+    fields = task._regrets_of(made, None if planned is None else route(planned, status=status))
     assert asked == judged
     names = {name for _, keys in judged for name in keys}
     assert fields == {f"{name}_m": 1.5 if name in names else 0.0 for name in ("regret", "suggested_regret")}
