@@ -21,6 +21,7 @@ from experiments.visit.plan import DEBRIEFING, PHASES, PLAYED, RESULT, VisitPlan
 from experiments.visit.recruiter import AFTER
 from experiments.visit.store import Assignment, PersonRow, Status, Store
 from experiments.visit.store.values import utc_now
+from experiments.web.protocol import Open
 from experiments.web.server.player import LiveTrial
 
 LOG = logging.getLogger("mjsim.study")
@@ -244,18 +245,17 @@ class BrowserPlayer:
             return None
         _, wait = await procedure.times(person)
         phase = person.phase
-        return LiveTrial(
-            phase,
-            folder.journal(phase),
-            folder.run(phase),
-            folder.settings(phase),
+        opening = Open(
+            str(folder.journal(phase)),
+            str(folder.run(phase)),
+            dict(folder.settings(phase)),
             await asyncio.to_thread(folder.before, phase),
-            time.monotonic() + wait,
             floor_plan=procedure.plan.floor_plan and phase == TASK,
             language=procedure.plan.language,
-            texts=procedure.plan.texts["hud"].words,
+            texts=dict(procedure.plan.texts["hud"].words),
             explains_markers=procedure.plan.explains_markers,
         )
+        return LiveTrial(phase, time.monotonic() + wait, opening)
 
-    async def over(self, trial: LiveTrial) -> None:  # noqa: ARG002
+    async def over(self) -> None:
         await self._procedure.record_trials(await self._procedure.store.person(self._id))

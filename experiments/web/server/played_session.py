@@ -218,17 +218,7 @@ class PlayedSession:
         crashes, safe = 0, 0
         self._taken = self._step = 0
         self._came.clear()
-        opening = protocol.Open(
-            str(trial.journal),
-            str(trial.run),
-            dict(trial.config),
-            [dict(fields) for fields in trial.before],
-            as_inputs_come=self._as_inputs_come,
-            floor_plan=trial.floor_plan,
-            language=trial.language,
-            texts=dict(trial.texts),
-            explains_markers=trial.explains_markers,
-        )
+        opening = msgspec.structs.replace(trial.opening, as_inputs_come=self._as_inputs_come)
         while crashes < MAX_CRASHES:
             self._set(State())
             worker = self._worker = self._worker or await self._pool.start()
@@ -253,7 +243,7 @@ class PlayedSession:
                     case Snapshot(step):
                         self._step = max(self._step, step)
                     case protocol.Saved():
-                        await self.player.over(trial)
+                        await self.player.over()
                         self.trial = None
                         LOG.info("session %s: %s is over", self.player.key[:12], trial.phase)
                         self._tell(message)

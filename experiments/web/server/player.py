@@ -1,9 +1,9 @@
 """Interfaces between the server for live trials and the code that schedules a participant's trials."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, Protocol
+from dataclasses import dataclass
+from typing import Protocol
+
+from experiments.web.protocol import Open
 
 
 @dataclass(frozen=True)
@@ -11,23 +11,13 @@ class LiveTrial:
     """A trial that a participant completes in a browser.
 
     Attributes:
-        run: Path of the run directory to be written.
-        before: Fields of the `phase_ended` events of earlier phases.
         leave_at: Monotonic time in seconds from which the participant may end the trial. It may be infinite.
-        texts: HUD texts that override those of the language.
-        explains_markers: True if the instructions show a picture of the condition's markers.
+        opening: Message that opens the trial in a worker.
     """
 
     phase: str
-    journal: Path
-    run: Path
-    config: Mapping[str, Any]
-    before: Sequence[Mapping[str, Any]]
     leave_at: float
-    floor_plan: bool = False
-    language: str = "en"
-    texts: Mapping[str, str] = field(default_factory=dict)
-    explains_markers: bool = False
+    opening: Open
 
 
 class Player(Protocol):
@@ -43,8 +33,8 @@ class Player(Protocol):
         """Return the next or current trial, or None if the current phase is not a trial."""
         ...
 
-    async def over(self, trial: LiveTrial) -> None:
-        """Record that the trial's run directory is complete, and advance to the next phase."""
+    async def over(self) -> None:
+        """Record that the current trial's run directory is complete, and advance to the next phase."""
         ...
 
 
