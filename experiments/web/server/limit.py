@@ -12,19 +12,16 @@ FORGOTTEN_S = 3600.0  # time without polling after which a page loses its positi
 class SessionLimit:
     """A limit on the number of concurrent sessions. Slots are given out by name, first come, first served.
 
+    The number of slots `count` may change. Running sessions then keep their slots.
     A waiting page polls for a slot with :meth:`ask`. If it stops polling, later pages may overtake it, but it
     regains its position when it polls again. The session of an admitted page then calls :meth:`hold`.
     """
 
     def __init__(self, count: int) -> None:
-        self._count = count
+        self.count = count
         self._held: dict[str, float] = {}  # expiry time of each slot, by name
         self._queue: dict[str, float] = {}  # deadline of each page's next poll, by name
         self._durations: deque[float] = deque(maxlen=100)
-
-    @property
-    def count(self) -> int:
-        return self._count
 
     @property
     def held(self) -> Collection[str]:
@@ -39,11 +36,7 @@ class SessionLimit:
 
         Until a session has ended, sessions are assumed to last `default` seconds.
         """
-        return position * (fmean(self._durations) if self._durations else default) / self._count
-
-    def resize(self, count: int) -> None:
-        """Change the number of slots. Running sessions keep their slots."""
-        self._count = count
+        return position * (fmean(self._durations) if self._durations else default) / self.count
 
     def ask(self, name: str, patience: float) -> int | None:
         """Request a slot for a page. Return its position in the queue, or None if it has a slot.
@@ -78,7 +71,7 @@ class SessionLimit:
 
     @property
     def _free(self) -> int:
-        return max(0, self._count - len(self._held))
+        return max(0, self.count - len(self._held))
 
     def _present(self) -> list[str]:
         now = time.monotonic()

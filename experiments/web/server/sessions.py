@@ -106,7 +106,7 @@ class Sessions:
             await asyncio.sleep(WATCH_PERIOD)
             await self.release(self._is_idle)
             learnt = self._capacity and self._capacity.measure(self.under_way, self.limit.held)
-            self.limit.resize(learnt or self.limit.count)
+            self.limit.count = learnt or self.limit.count
 
     async def release(self, which: Callable[[PlayedSession], bool] = lambda _: True) -> None:
         for session in [session for session in self.under_way.values() if which(session)]:
