@@ -2,36 +2,13 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
-from experiments.visit.phases.base import Again, Done, FormData, FormPhase, Visitor
+from experiments.visit.phases.base import Again, Answers, Done, FormData, FormPhase, Visitor
 from experiments.visit.plan import Device
 
 MEASURES = ("frames_per_s", "latency_ms", "width", "height", "pixel_ratio")
 MAX_RENDERER = 200  # maximum length of the WebGL renderer's name, in characters
-
-
-@dataclass(frozen=True)
-class _Measured:
-    values: Mapping[str, float]
-    keyboard: bool
-    webgl: bool
-    renderer: str
-
-    def faults(self, needed: Device, draws: bool) -> list[str]:
-        """Return the names of the error texts for all unmet requirements.
-
-        The frame rate is only checked if the browser `draws` the scene itself.
-        """
-        values = self.values
-        found = [
-            ("bad_frames", draws and values["frames_per_s"] < needed.frames_per_s),
-            ("bad_latency", values["latency_ms"] > needed.latency_ms),
-            ("bad_keyboard", needed.keyboard and not self.keyboard),
-            ("bad_screen", values["width"] < needed.width or values["height"] < needed.height),
-        ]
-        return [name for name, bad in found if bad]
 
 
 class DeviceCheck(FormPhase):
@@ -45,18 +22,12 @@ class DeviceCheck(FormPhase):
         measured = _measured(sent)
         if measured is None:
             return Again(self._plan.texts["common"]["needs_script"])
-        answers = {
-            **measured.values,
-            "keyboard": measured.keyboard,
-            "webgl": measured.webgl,
-            "renderer": measured.renderer,
-        }
-        faults = measured.faults(self._plan.device, measured.webgl)
+        faults = _faults(measured, self._plan.device)
         if sent.get("give_up"):
-            return Done({**answers, "faults": faults}, "screened_out" if faults else "next")
+            return Done({**measured, "faults": faults}, "screened_out" if faults else "next")
         if faults:
             return Again(" ".join(self.texts[name] for name in faults))
-        return Done(answers)
+        return Done(measured)
 
     def example(self) -> dict[str, str]:
         needed = self._plan.device
@@ -65,12 +36,26 @@ class DeviceCheck(FormPhase):
         return {**{name: str(value) for name, value in fits.items()}, "keyboard": "yes", "webgl": "yes"}
 
 
-def _measured(sent: FormData) -> _Measured | None:
+def _faults(measured: Answers, needed: Device) -> list[str]:
+    """Return the names of the error texts for all unmet requirements.
+
+    The frame rate is only checked if the browser draws the scene itself.
+    """
+    found = [
+        ("bad_frames", measured["webgl"] and measured["frames_per_s"] < needed.frames_per_s),
+        ("bad_latency", measured["latency_ms"] > needed.latency_ms),
+        ("bad_keyboard", needed.keyboard and not measured["keyboard"]),
+        ("bad_screen", measured["width"] < needed.width or measured["height"] < needed.height),
+    ]
+    return [name for name, bad in found if bad]
+
+
+def _measured(sent: FormData) -> Answers | None:
     try:
         values = {name: float(sent.get(name, "")) for name in MEASURES}
     except ValueError:
         return None
     if not all(math.isfinite(value) and 0.0 <= value < 1e6 for value in values.values()):
         return None
-    webgl = sent.get("webgl") == "yes"
-    return _Measured(values, sent.get("keyboard") == "yes", webgl, sent.get("renderer", "")[:MAX_RENDERER])
+    checked = {name: sent.get(name) == "yes" for name in ("keyboard", "webgl")}
+    return {**values, **checked, "renderer": sent.get("renderer", "")[:MAX_RENDERER]}
