@@ -2,8 +2,9 @@
 
 import asyncio
 import time
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
-from typing import NoReturn
+from typing import Any, NoReturn, Self
 
 import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -44,35 +45,28 @@ class BrowserSocket:
 
     async def serve(self, session: PlayedSession) -> None:
         """Serve a participant's page until it disconnects."""
-        sending = asyncio.create_task(self._send_all())
-        receiving = asyncio.create_task(self._receive_all(session))
-        beating = asyncio.create_task(self._beat(session))
-        try:
-            await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
-            session.detach(self)
-            self.close(protocol.REFUSED, "")
-            await asyncio.wait([sending], timeout=CLOSE_TIMEOUT)  # waits until the last message is sent
-        finally:
-            session.detach(self)
-            for task in (sending, receiving, beating):
-                task.cancel()
-                with suppress(asyncio.CancelledError, WebSocketDisconnect, OSError):
-                    await task
+        await self._until_closed(session.detach, self._receive_all(session), self._beat(session))
 
     async def watch(self, session: PlayedSession) -> None:
         """Show a session to a spectator until their page disconnects or sends a message."""
-        sending = asyncio.create_task(self._send_all())
-        receiving = asyncio.create_task(self._socket.receive())
         session.spectators.join(self)
+        await self._until_closed(session.spectators.leave, self._socket.receive())
+
+    async def _until_closed(
+        self, leave: Callable[[Self], None], receiving: Awaitable[Any], *others: Awaitable[Any]
+    ) -> None:
+        """Send the queued messages until `receiving` or the connection ends. Then leave the session."""
+        tasks = [asyncio.ensure_future(one) for one in (self._send_all(), receiving, *others)]
         try:
-            await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait(tasks[:2], return_when=asyncio.FIRST_COMPLETED)
+            leave(self)
             self.close(protocol.REFUSED, "")
-            await asyncio.wait([sending], timeout=CLOSE_TIMEOUT)
+            await asyncio.wait(tasks[:1], timeout=CLOSE_TIMEOUT)  # waits until the last message is sent
         finally:
-            session.spectators.leave(self)
-            for task in (sending, receiving):
+            leave(self)
+            for task in tasks:
                 task.cancel()
-                with suppress(asyncio.CancelledError, WebSocketDisconnect, OSError, RuntimeError):
+                with suppress(asyncio.CancelledError, WebSocketDisconnect, OSError):
                     await task
 
     async def _send_all(self) -> None:
