@@ -25,7 +25,12 @@ _IMPORT = re.compile(r"(\bfrom\s*|\bimport\s*)\"(\.{1,2}/[^\"]+)\"")
 IMMUTABLE = "public, max-age=31536000, immutable"
 CHECKED = "no-cache"  # browsers may cache the file, but must revalidate it before each use
 SCENE_HEADERS = {"Cache-Control": IMMUTABLE, "Vary": "Accept-Encoding"}
-_MEDIA_TYPES = {".glb": "model/gltf-binary", ".json": "application/json", ".webp": "image/webp"}
+MEDIA_TYPES = {
+    ".glb": "model/gltf-binary",
+    ".js": "text/javascript",
+    ".json": "application/json",
+    ".webp": "image/webp",
+}
 _HASH, _NAME = re.compile(r"[0-9a-f]{16,64}"), re.compile(r"(objects/)?[A-Za-z0-9_-][A-Za-z0-9_.-]*")
 
 
@@ -83,7 +88,7 @@ def scene_route(folder: Path) -> Route:
     def serve(request: Request) -> Response:
         scene, name = request.path_params["hash"], request.path_params["name"]
         path = folder / scene / name
-        kind = _MEDIA_TYPES.get(path.suffix)
+        kind = MEDIA_TYPES.get(path.suffix)
         if kind is None or not _HASH.fullmatch(scene) or not _NAME.fullmatch(name):
             return PlainTextResponse("not found\n", 404)
         compressed = path.with_name(f"{path.name}{GZIP}")
@@ -121,6 +126,11 @@ _templates.env.auto_reload = False  # template files are not checked for changes
 
 def page(request: Request, name: str, status: int = 200, **values: Any) -> Response:
     return _templates.TemplateResponse(request, f"{name}.html", values, status)
+
+
+def rendered(name: str, **values: Any) -> str:
+    """Return a page without the request that a template for a server needs."""
+    return _templates.get_template(f"{name}.html").render(values)
 
 
 def trial_texts(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:

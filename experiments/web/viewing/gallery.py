@@ -73,7 +73,7 @@ def write_gallery(
     while (old := out / SHEET.format(number)).is_file():  # contact sheets that remain from a larger gallery
         old.unlink()
         number += 1
-    page = own_page("gallery.html", "gallery.js", homes=[(home, f"{HOMES}/{f.name}") for home, f in shown])
+    page = own_page("gallery", "gallery.js", homes=[(home, f"{HOMES}/{f.name}") for home, f in shown])
     with replacing(out / PAGE) as temporary:
         temporary.write_text(page, "utf-8")
     return len(homes) - len(shown)

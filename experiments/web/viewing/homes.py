@@ -150,7 +150,6 @@ def _tour(house: House) -> dict[str, Any]:
         reached = times[np.flatnonzero(gaps < gaps.min() + NEAR)[0]]
         moments.append({"t": round(float(reached), 1), "kind": "room", "text": house.rooms.label(key)})
     return {
-        "title": house.catalogue.label,
         "person": {
             "eye_height": person.eye_height,
             "eye_forward": 0.0,
@@ -159,7 +158,6 @@ def _tour(house: House) -> dict[str, Any]:
         },
         "bounds": house.bounds,
         "models": {},
-        "labels": {},
         "time": times.round(1).tolist(),
         "body": body.round(3).ravel().tolist(),
         "hands": INSIDE * len(times),

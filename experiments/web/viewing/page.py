@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from jinja2 import Environment, FileSystemLoader
 
 from experiments.house import House, read_words
 from experiments.record.reader import Record
 from experiments.trials.design import counted
 from experiments.trials.replay.replay import replay
 from experiments.trials.replay.replayer import Replayer
-from experiments.web.client_files import CLIENT, STATIC, modules_of, trial_texts
+from experiments.web.client_files import MEDIA_TYPES, STATIC, modules_of, rendered, trial_texts
 from experiments.web.viewing import timeline
 from experiments.web.viewing.recorder import RunRecorder
 from experiments.web.worker.encoders import data_url
@@ -22,13 +21,6 @@ from mjsim.formats.gltf.cache import cached_scene
 from mjsim.formats.gltf.store import GZIP, scenes_folder
 from mjsim.house.scene.avatar import EYE_FORWARD
 from mjsim.render import render_pictures
-
-_TYPES = {
-    ".js": "text/javascript",
-    ".json": "application/json",
-    ".glb": "model/gltf-binary",
-    ".webp": "image/webp",
-}
 
 
 def view_page(
@@ -66,31 +58,21 @@ def run_page(title: str, run: Mapping[str, Any], scene: Mapping[str, bytes], **v
     urls = {name: _data_url(name, content) for name, content in scene.items()}
     texts = trial_texts(read_words())
     packed = {"run": _packed(run), "scene": _packed(urls)}
-    return own_page("view.html", "view/view.js", title=title, texts=texts, **packed, **values)
+    return own_page("view", "view/view.js", title=title, texts=texts, **packed, **values)
 
 
 def own_page(template: str, entry: str, **values: Any) -> str:
     """Return a self-contained HTML page that runs the client's module `entry`."""
     modules = {name: _data_url(name, source.encode()) for name, source in modules_of(entry).items()}
-    page: str = (
-        Environment(loader=FileSystemLoader(CLIENT / "templates"), autoescape=True, trim_blocks=True)
-        .get_template(template)
-        .render(
-            style=(STATIC / "style.css").read_text("utf-8"),
-            modules=msgspec.json.encode({"imports": modules}).decode(),
-            entry=entry,
-            **values,
-        )
-    )
-    return page
+    style = (STATIC / "style.css").read_text("utf-8")
+    imports = msgspec.json.encode({"imports": modules}).decode()
+    return rendered(template, style=style, modules=imports, entry=entry, **values)
 
 
 def _run(record: Record, house: House, seen: RunRecorder) -> dict[str, Any]:
     """Return the data of the page in the `Run` format of view/run.js."""
     person = record.person
-    catalogue = house.catalogue.objects
     return {
-        "title": _title(record),
         "person": {
             "eye_height": person.eye_height,
             "eye_forward": EYE_FORWARD,
@@ -99,7 +81,6 @@ def _run(record: Record, house: House, seen: RunRecorder) -> dict[str, Any]:
         },
         "bounds": house.bounds,
         "models": {placed.name: placed.model for placed in record.episode.objects},
-        "labels": {placed.name: catalogue[placed.model].label for placed in record.episode.objects},
         "time": seen.time,
         "body": seen.body,
         "hands": seen.hands,
@@ -134,4 +115,4 @@ def _packed(value: Any) -> str:
 
 
 def _data_url(name: str, data: bytes) -> str:
-    return f"data:{_TYPES[Path(name).suffix]};base64,{base64.b64encode(data).decode()}"
+    return f"data:{MEDIA_TYPES[Path(name).suffix]};base64,{base64.b64encode(data).decode()}"

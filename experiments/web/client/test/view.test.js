@@ -13,8 +13,8 @@ const EMPTY = /** @type {HudState} */ ({ delivered: 0 });
 const FULL = /** @type {HudState} */ ({ delivered: 1 });
 
 const run = new Run({
-  title: "a run", person: { eye_height: 1.6, eye_forward: 0.06, body_radius: 0.2, field_of_view: 1.5 }, bounds: [0, 0, 8, 6],
-  models: { cup: "mug" }, labels: { cup: "Blue mug" },
+  person: { eye_height: 1.6, eye_forward: 0.06, body_radius: 0.2, field_of_view: 1.5 }, bounds: [0, 0, 8, 6],
+  models: { cup: "mug" },
   time: [0, 0.04, 0.08, 0.12],
   body: [0, 0, 3.1, 0, 0.1, 0, -3.1, 0.2, 0.2, 0, -3.1, 0.2, 0.3, 0, -3.1, 0.2],
   hands: [0.3, 0.2, 1, 0.3, -0.2, 1, 0.5, 0.2, 1, 0.3, -0.2, 1, 0.5, 0.2, 1, 0.3, -0.2, 1, 0.5, 0.2, 1, 0.3, -0.2, 1],

@@ -16,8 +16,8 @@ const hud = (delivered, clock) => ({
 const STEPS = 100; // number of steps of 0.1 s
 const steps = Array.from({ length: STEPS + 1 }, (_, k) => k);
 const RUN = {
-  title: "a run", person: { eye_height: 1.6, eye_forward: 0.06, body_radius: 0.2, field_of_view: 1.5 }, bounds: [0, 0, 8, 6],
-  models: { cup: "mug" }, labels: { cup: "Blue mug" }, time: steps.map((k) => k / 10), body: steps.flatMap((k) => [k / 100, 0, 0, 0]),
+  person: { eye_height: 1.6, eye_forward: 0.06, body_radius: 0.2, field_of_view: 1.5 }, bounds: [0, 0, 8, 6],
+  models: { cup: "mug" }, time: steps.map((k) => k / 10), body: steps.flatMap((k) => [k / 100, 0, 0, 0]),
   hands: steps.flatMap(() => [0.3, 0.2, 1, 0.3, -0.2, 1]), objects: { cup: [0, 1, 1, 1, 1, 0, 0, 0] },
   hud: [[0, hud(0, 0)], [50, hud(1, 5)]], markers: [{ shape: "sphere", role: "breadcrumb" }], shown: [[0, [0]]],
   moments: [{ t: 2, kind: "pick", text: "Picked up Blue mug" }, { t: 5, kind: "place", text: "Put it away" }],

@@ -6,7 +6,7 @@ import { mixed } from "../prediction/poses.js";
 
 /** @typedef {{ t: number, kind: string, text: string }} Moment */
 /** @typedef {{ t: number, cost_m: number, status: string, path: number[] }} Plan */
-/** @typedef {{ title: string, person: { eye_height: number, eye_forward: number, body_radius: number, field_of_view: number }, bounds: [number, number, number, number], models: Record<string, string>, labels: Record<string, string>, time: number[], body: number[], hands: number[], objects: Record<string, number[]>, hud: [number, HudState][], markers: Marker[], shown: [number, number[]][], moments: Moment[], plans: Plan[], pictures: Record<string, string> }} Recorded as `RunRecorder` and `view_page` write it */
+/** @typedef {{ person: { eye_height: number, eye_forward: number, body_radius: number, field_of_view: number }, bounds: [number, number, number, number], models: Record<string, string>, time: number[], body: number[], hands: number[], objects: Record<string, number[]>, hud: [number, HudState][], markers: Marker[], shown: [number, number[]][], moments: Moment[], plans: Plan[], pictures: Record<string, string> }} Recorded as `RunRecorder` and `view_page` write it */
 
 const [BODY, HANDS, POSE] = [4, 6, 8]; // numbers of a step
 
