@@ -9,7 +9,7 @@ from sqlalchemy import Select, bindparam, func, insert, or_, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection as Connection
 
 from experiments.errors import StoreError
-from experiments.visit.store.part import StorePart, lock_study, note, transaction
+from experiments.visit.store.part import StorePart, columns_of, lock_study, note, transaction
 from experiments.visit.store.tables import assignment, person, study
 from experiments.visit.store.values import (
     ACTIVE,
@@ -23,7 +23,7 @@ from experiments.visit.store.values import (
 )
 
 SEEDS = 2**53  # seeds are below this value, because JavaScript represents such integers exactly
-FIELDS = [column for column in assignment.c if column.name not in ("id", "study_id", "active")]
+FIELDS = columns_of(Assignment, assignment)
 _PLACE = select(*FIELDS).where(assignment.c.person_id == bindparam("person"))
 
 # These queries are built at import, because building a query takes as long as running it.
@@ -128,8 +128,7 @@ class Assignments(StorePart):
     async def assignments(self) -> tuple[Assignment, ...]:
         """Return all assigned and released places, in the order in which they were first assigned."""
         query = select(*FIELDS).where(assignment.c.study_id == self._study_id).order_by(assignment.c.id)
-        async with self._database.reading() as connection:
-            return tuple(Assignment(*row) for row in await connection.execute(query))
+        return tuple(Assignment(*row) for row in await self._database.rows(query))
 
     @transaction
     async def set_quota(self, connection: Connection, cell: int, wanted: int, who: str) -> None:

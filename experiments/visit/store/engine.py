@@ -4,13 +4,13 @@ import asyncio
 import random
 import sqlite3
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from itertools import count
 from pathlib import Path
 from typing import Any, TypeVar
 
-from sqlalchemy import URL, Connection, event, make_url, text
+from sqlalchemy import URL, Connection, Select, event, make_url, text
 from sqlalchemy.exc import ArgumentError, DBAPIError, IntegrityError, NoSuchModuleError, SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
 from sqlalchemy.util import await_only
@@ -86,6 +86,10 @@ class Database:
         """Open a connection for reading. Each statement sees all data that were committed before it."""
         async with self._connection(begin="") as connection:
             yield connection
+
+    async def rows(self, query: Select[Any], values: Mapping[str, Any] | None = None) -> list[Any]:
+        async with self.reading() as connection:
+            return list(await connection.execute(query, values))
 
     @asynccontextmanager
     async def snapshot(self) -> AsyncIterator[AsyncConnection]:

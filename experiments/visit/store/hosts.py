@@ -33,8 +33,7 @@ class Hosts(StorePart):
 
     async def hosts(self) -> tuple[Host, ...]:
         query = select(host.c.name, host.c.seen, host.c.draining).where(host.c.study_id == self._study_id)
-        async with self._database.reading() as connection:
-            return tuple(Host(*row) for row in await connection.execute(query.order_by(host.c.name)))
+        return tuple(Host(*row) for row in await self._database.rows(query.order_by(host.c.name)))
 
     @transaction
     async def claim(

@@ -13,14 +13,14 @@ from sqlalchemy import ColumnElement, insert, select
 from sqlalchemy.ext.asyncio import AsyncConnection as Connection
 
 from experiments.errors import StoreError
-from experiments.visit.store.part import StorePart, database_now, lock_study, transaction
+from experiments.visit.store.part import StorePart, columns_of, database_now, lock_study, transaction
 from experiments.visit.store.tables import payment, person
 from experiments.visit.store.values import PaymentEvent, PaymentKind
 
 # A participant receives at most one payment of these types.
 ONCE: tuple[PaymentKind, ...] = ("reward", "screen_out", "partial")
 IN_DOUBT_AFTER = timedelta(minutes=10)
-_FIELDS = [column for column in payment.c if column.name != "study_id"]
+_FIELDS = columns_of(PaymentEvent, payment)
 
 
 class Ledger(StorePart):

@@ -1,11 +1,12 @@
 """The base class for all parts of the store."""
 
+import dataclasses
 import functools
 from collections.abc import Awaitable, Callable, Coroutine, Mapping
 from datetime import datetime
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from sqlalchemy import CursorResult, func, insert, select
+from sqlalchemy import Column, CursorResult, Table, func, insert, select
 from sqlalchemy.ext.asyncio import AsyncConnection as Connection
 
 from experiments.visit.store import tables
@@ -42,6 +43,11 @@ def transaction(
         return await database.write(lambda connection: method(self, connection, *args, **options))
 
     return run
+
+
+def columns_of(row: type[Any], table: Table) -> list[Column[Any]]:
+    """Return the columns of a table that are fields of a data class, in the order of the fields."""
+    return [table.c[field.name] for field in dataclasses.fields(row) if field.name in table.c]
 
 
 def new_id(inserted: CursorResult[Any]) -> int:

@@ -8,22 +8,12 @@ from sqlalchemy import ColumnElement, bindparam, delete, insert, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection as Connection
 
 from experiments.errors import StoreError
-from experiments.visit.store.part import StorePart, new_id, note, transaction
+from experiments.visit.store.part import StorePart, columns_of, new_id, note, transaction
 from experiments.visit.store.tables import answer, person
 from experiments.visit.store.tables import identity as ids
 from experiments.visit.store.values import PersonRow, utc_now
 
-_FIELDS = (
-    person.c.id,
-    person.c.token_hash,
-    person.c.platform,
-    person.c.status,
-    person.c.phase,
-    person.c.created,
-    person.c.seen,
-    person.c.delete_wanted,
-    person.c.host,
-)
+_FIELDS = columns_of(PersonRow, person)
 # This query is built at import, because building a query takes as long as running it.
 _FIND = select(*_FIELDS).where(
     person.c.study_id == bindparam("study"), person.c.token_hash == bindparam("token")
@@ -80,26 +70,22 @@ class People(StorePart):
 
     async def find(self, token_hash: str) -> PersonRow | None:
         """Return the participant whose link has this token hash, or None."""
-        async with self._database.reading() as connection:
-            found = await connection.execute(_FIND, {"study": self._study_id, "token": token_hash})
-            row = found.first()
-            return None if row is None else PersonRow(*row)
+        found = await self._database.rows(_FIND, {"study": self._study_id, "token": token_hash})
+        return PersonRow(*found[0]) if found else None
 
     async def person(self, person_id: int) -> PersonRow:
         """Return the participant with this number. Raises StoreError if there is no such participant."""
-        async with self._database.reading() as connection:
-            row = (await connection.execute(self._select(person.c.id == person_id))).first()
-        if row is None:
+        found = await self._database.rows(self._select(person.c.id == person_id))
+        if not found:
             raise StoreError(
                 f"There is no person {person_id} in this study; `mjsim study` shows the numbers."
             )
-        return PersonRow(*row)
+        return PersonRow(*found[0])
 
     async def people(self) -> tuple[PersonRow, ...]:
         """Return all participants, in order of arrival."""
-        query = self._select().order_by(person.c.id)
-        async with self._database.reading() as connection:
-            return tuple(PersonRow(*row) for row in await connection.execute(query))
+        found = await self._database.rows(self._select().order_by(person.c.id))
+        return tuple(PersonRow(*row) for row in found)
 
     async def identity(self, person_id: int) -> dict[str, str]:
         """Return a participant's platform ids, or an empty dictionary if they have been deleted."""

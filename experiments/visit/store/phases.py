@@ -133,8 +133,7 @@ class Phases(StorePart):
     async def _rows(self, table: Table, person_id: int | None, *which: ColumnElement[bool]) -> Any:
         query = _ROWS[table] if person_id is None else _ROWS_OF_ONE[table]
         values = {"study": self._study_id} | ({} if person_id is None else {"person": person_id})
-        async with self._database.reading() as connection:
-            return (await connection.execute(query.where(*which) if which else query, values)).all()
+        return await self._database.rows(query.where(*which) if which else query, values)
 
 
 async def _phase(connection: Connection, person_id: int, name: str) -> PhaseRow | None:

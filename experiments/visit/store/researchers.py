@@ -4,14 +4,14 @@ import asyncio
 import re
 from datetime import datetime
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, get_args
 
 from sqlalchemy import insert, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection as Connection
 
 from experiments.errors import StoreError
 from experiments.visit.store.engine import Database
-from experiments.visit.store.part import transaction
+from experiments.visit.store.part import columns_of, transaction
 from experiments.visit.store.tables import login, researcher
 from experiments.visit.store.values import Researcher, Role, utc_now
 
@@ -20,13 +20,7 @@ if TYPE_CHECKING:
 
 PASSWORD_MEMORY_KIB = 65_536  # memory needed to hash a password, as recommended by RFC 9106
 NAME = re.compile(r"[a-z0-9][a-z0-9._@-]{0,59}")
-_FIELDS = (
-    researcher.c.id,
-    researcher.c.name,
-    researcher.c.role,
-    researcher.c.created,
-    researcher.c.disabled,
-)
+_FIELDS = columns_of(Researcher, researcher)
 
 
 class Researchers:
@@ -60,18 +54,19 @@ class Researchers:
         return await self._database.write(work)
 
     async def all(self) -> tuple[Researcher, ...]:
-        async with self._database.reading() as connection:
-            return tuple(Researcher(*row) for row in await connection.execute(select(*_FIELDS)))
+        return tuple(Researcher(*row) for row in await self._database.rows(select(*_FIELDS)))
 
     async def check(self, name: str, password: str) -> Researcher | None:
         """Return the researcher with these credentials, or None if they are wrong or the account is disabled.
 
         The check takes the same time for unknown names. The caller must limit the number of attempts.
         """
-        row = await self._row(name) if NAME.fullmatch(name) else None
-        if row is None:
+        query = select(*_FIELDS, researcher.c.password).where(researcher.c.name == name)
+        found = await self._database.rows(query) if NAME.fullmatch(name) else ()
+        if not found:
             await self._hash(password)
             return None
+        (row,) = found
         from argon2.exceptions import VerifyMismatchError
 
         try:
@@ -126,19 +121,13 @@ class Researchers:
             .where(login.c.token_hash == token_hash, login.c.revoked.is_(None))
             .where(login.c.expires > utc_now(), researcher.c.disabled.is_(False))
         )
-        async with self._database.reading() as connection:
-            row = (await connection.execute(query)).first()
-        return None if row is None else Researcher(*row)
+        found = await self._database.rows(query)
+        return Researcher(*found[0]) if found else None
 
     @transaction
     async def log_out(self, connection: Connection, token_hash: str) -> None:
         mine = (login.c.token_hash == token_hash, login.c.revoked.is_(None))
         await connection.execute(update(login).where(*mine).values(revoked=utc_now()))
-
-    async def _row(self, name: str) -> Any:
-        async with self._database.reading() as connection:
-            query = select(*_FIELDS, researcher.c.password).where(researcher.c.name == name)
-            return (await connection.execute(query)).first()
 
     async def _hash(self, password: str) -> str:
         return await asyncio.to_thread(self._hasher.hash, password)

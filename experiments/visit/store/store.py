@@ -16,7 +16,7 @@ from experiments.visit.store.engine import Database
 from experiments.visit.store.erasure import Erasure
 from experiments.visit.store.hosts import Hosts
 from experiments.visit.store.ledger import Ledger
-from experiments.visit.store.part import new_id, note, transaction
+from experiments.visit.store.part import columns_of, new_id, note, transaction
 from experiments.visit.store.people import People
 from experiments.visit.store.phases import Endings, Phases
 from experiments.visit.store.researchers import PASSWORD_MEMORY_KIB, Researchers
@@ -89,8 +89,7 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         await back_up(self._database, path)
 
     async def study(self) -> StudyRow:
-        async with self._database.reading() as connection:
-            row = (await connection.execute(select(study).where(study.c.id == self._study_id))).one()
+        (row,) = await self._database.rows(select(study).where(study.c.id == self._study_id))
         quotas = {int(cell): wanted for cell, wanted in row.quotas.items()}
         return StudyRow(row.id, row.name, row.file_hash, row.state, row.created, quotas)
 
@@ -108,10 +107,9 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         await note(connection, self._study_id, who, action, details or {}, utc_now())
 
     async def audit_log(self) -> tuple[AuditRow, ...]:
-        columns = (audit.c.id, audit.c.at, audit.c.who, audit.c.action, audit.c.details)
-        query = select(*columns).where(audit.c.study_id == self._study_id).order_by(audit.c.id)
-        async with self._database.reading() as connection:
-            return tuple(AuditRow(*row) for row in await connection.execute(query))
+        query = select(*columns_of(AuditRow, audit)).where(audit.c.study_id == self._study_id)
+        found = await self._database.rows(query.order_by(audit.c.id))
+        return tuple(AuditRow(*row) for row in found)
 
 
 async def change_database(path: Path, study_name: str, work: Callable[[Store], Awaitable[bool]]) -> bool:
