@@ -13,7 +13,7 @@ from experiments.record.phases import STORY, TRAINING
 from experiments.session.familiarise import story_text, with_names
 from experiments.trials.training import trials_of
 from experiments.trials.trial_config import MAX_SEED, TrialConfig
-from experiments.visit.plan import COMPREHENSION, RESULT, Device, Limits, VisitPlan
+from experiments.visit.plan import COMPREHENSION, RESULT, Limits, VisitPlan
 from experiments.visit.recruiter import OpenLink
 from experiments.visit.store import Assignment, CellQuota
 from experiments.visit.texts import Section, read_texts, story_file
@@ -24,7 +24,7 @@ from mjsim.formats.gltf.store import scenes_folder
 from mjsim.generator.home_cache import load_catalogue
 
 NAME = "play"  # name under which `mjsim play` stores its study in the database
-MINUTES = 15.0
+MINUTES = 15
 DAY_S = 86400.0
 MAX_VISITS = 1_000_000
 PLACEHOLDERS = ("title", "institution", "contact", "minutes")  # names of placeholders in study texts
@@ -79,29 +79,27 @@ def plan_of_play(
         return trials_of(msgspec.structs.replace(task, **seeds))
 
     return VisitPlan(
-        "play",
-        texts["welcome"]["title"],
-        arguments.language,
-        tuple(shown),
-        texts,
-        _story(arguments, texts["play"], task, shown),
-        arguments.minimum,
-        frozenset(),
-        Limits(
+        name=NAME,
+        title=texts["welcome"]["title"],
+        language=arguments.language,
+        phases=tuple(shown),
+        texts=texts,
+        story=_story(arguments, texts["play"], task, shown),
+        minimum=arguments.minimum,
+        limits=Limits(
             idle=max(arguments.idle, 1.0),
             abandoned_after=DAY_S,
             timed_out_after=math.inf,
             attempts=None,
         ),
-        Device(),
-        MINUTES,
-        [CellQuota(MAX_VISITS, [task.house_seed])],
-        "uniform",
-        trials,
-        OpenLink(repeats=again),
-        arguments.film,
-        poster(arguments.film) if arguments.film else "",
-        view_path(load_catalogue(task.house), scenes_folder()),
+        minutes=MINUTES,
+        cells=[CellQuota(MAX_VISITS, [task.house_seed])],
+        assignment="uniform",
+        trials=trials,
+        recruiter=OpenLink(repeats=again),
+        film=arguments.film,
+        poster=poster(arguments.film) if arguments.film else "",
+        picture=view_path(load_catalogue(task.house), scenes_folder()),
         headset=arguments.xr,
         floor_plan=True,
     )

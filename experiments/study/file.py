@@ -19,7 +19,7 @@ from experiments.trials.design import counted, read_design
 from experiments.trials.exclusions import Exclusions
 from experiments.trials.toml_file import TomlFile
 from experiments.trials.trial_config import TrialConfig
-from experiments.visit.plan import COMPLETION, COMPREHENSION, CONSENT, PHASES, PLAYED, Count, Device, Limits
+from experiments.visit.plan import COMPLETION, COMPREHENSION, CONSENT, PHASES, PLAYED, VisitSettings
 from experiments.visit.texts import Texts, read_texts, story_file
 from mjsim.support.files import read_bytes
 from mjsim.support.urls import parse_url
@@ -82,27 +82,14 @@ class Recruitment(_Table, frozen=True):
             raise ValueError(f"api_url is {self.api_url!r}; it gets a secret, so it must begin with https://")
 
 
-class StudySettings(_Table, frozen=True):
+class StudySettings(VisitSettings, frozen=True, kw_only=True):
     """The contents of the `[study]` table in a study file."""
 
-    name: Annotated[str, msgspec.Meta(pattern=r"^[a-z0-9][a-z0-9-]{0,39}\Z")]
-    title: Annotated[str, msgspec.Meta(pattern=r"\S")]
     institution: str
     contact: str
-    minutes: Count = 25
-    language: Annotated[str, msgspec.Meta(pattern=r"^[a-zA-Z]{2,3}(-[a-zA-Z0-9]{2,8})*\Z")] = "en"
     texts: str | None = None
-    consent_version: str = "1"  # version of the consent text, which is stored with each agreement
-    phases: tuple[str, ...] = PHASES
-    require_film: bool = False  # if True, participants must play the film to its end
-    explain_markers: bool = False  # if True, the instructions show a picture of the condition's markers
-    assignment: Literal["balanced", "uniform"] = "balanced"
-    minimum: dict[str, Any] = {}  # minimum duration of phases, in seconds
-    optional: tuple[str, ...] = ()
     pay: Pay = Pay()
-    device: Device = Device()
     recruitment: Recruitment = Recruitment()
-    limits: Limits = Limits()
 
     def __post_init__(self) -> None:
         usual = [name for name in self.phases if name in PHASES]

@@ -12,7 +12,7 @@ from experiments.session.familiarise import with_names
 from experiments.study.file import Study
 from experiments.study.recruitment import recruiter
 from experiments.trials.training import trials_of
-from experiments.visit.plan import PLAYED, VisitPlan
+from experiments.visit.plan import PLAYED, VisitPlan, VisitSettings
 from experiments.visit.recruiter import Recruiter
 from experiments.visit.store import Assignment, CellQuota
 from experiments.web.worker.encoders import poster
@@ -43,27 +43,18 @@ def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None =
         )
         return trials_of(task)
 
+    shared = {name: getattr(settings, name) for name in VisitSettings.__struct_fields__}
     return VisitPlan(
-        settings.name,
-        settings.title,
-        settings.language,
-        settings.phases,
-        study.texts,
-        with_names(study.story, catalogue.in_language(settings.language)),
-        {**settings.minimum, **endless},
-        frozenset(settings.optional),
-        settings.limits,
-        settings.device,
-        settings.minutes,
-        [CellQuota(len(cell.trials), [trial.house_seed for trial in cell.trials]) for cell in study.cells],
-        settings.assignment,
-        trials,
-        platform,
-        film,
-        poster(film) if film else "",
-        view_path(catalogue, scenes_folder()),
+        **shared | {"minimum": {**settings.minimum, **endless}},
+        texts=study.texts,
+        story=with_names(study.story, catalogue.in_language(settings.language)),
+        cells=[
+            CellQuota(len(cell.trials), [trial.house_seed for trial in cell.trials]) for cell in study.cells
+        ],
+        trials=trials,
+        recruiter=platform,
+        film=film,
+        poster=poster(film) if film else "",
+        picture=view_path(catalogue, scenes_folder()),
         rehearsal=study.rehearsal,
-        film_required=settings.require_film,
-        explains_markers=settings.explain_markers,
-        consent_version=settings.consent_version,
     )

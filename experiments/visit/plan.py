@@ -1,7 +1,6 @@
 """Visit plans, which define the phases of a study and the settings that all participants share."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -50,18 +49,32 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             )
 
 
-@dataclass(frozen=True)
-class VisitPlan:
+class VisitSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The settings of a visit that a study file contains."""
+
+    name: Annotated[
+        str, msgspec.Meta(pattern=r"^[a-z0-9][a-z0-9-]{0,39}\Z")
+    ]  # name of the study in the database
+    title: Annotated[str, msgspec.Meta(pattern=r"\S")]
+    minutes: Count = 25  # expected duration of a visit
+    language: Annotated[str, msgspec.Meta(pattern=r"^[a-zA-Z]{2,3}(-[a-zA-Z0-9]{2,8})*\Z")] = "en"
+    consent_version: str = "1"  # version of the consent text, which is stored with each agreement
+    phases: tuple[str, ...] = PHASES  # a visit is finished when the participant reaches the last phase
+    require_film: bool = False  # if True, participants must play the film to its end
+    explain_markers: bool = False  # if True, the instructions show a picture of the condition's markers
+    assignment: Rule = "balanced"
+    # Minimum duration of phases in seconds. In a `VisitPlan`, it is infinite for trials that cannot be ended early.
+    minimum: dict[str, Any] = {}
+    optional: tuple[str, ...] = ()  # phases that participants may skip
+    device: Device = Device()
+    limits: Limits = Limits()
+
+
+class VisitPlan(VisitSettings, frozen=True, kw_only=True):
     """A plan with the phases and settings of a study or of `mjsim play`.
 
     Attributes:
-        name: Name of the study in the database.
-        language: Language tag of the pages.
-        phases: Names of the phases, in order. A visit is finished when the participant reaches the last one.
         story: Text of the story, with blank lines between paragraphs.
-        minimum: Minimum duration of each phase, in seconds. It is infinite for trials that cannot be ended early.
-        optional: Names of the phases that participants may skip.
-        minutes: Expected duration of a visit, in minutes.
         cells: Cells of the design. Each participant is assigned a place in one of them.
         trials: Function that returns the settings of the trials for an assignment, by phase.
         poster: Data URL of the picture that the page of the film shows before the film is played, or an empty text.
@@ -70,24 +83,11 @@ class VisitPlan:
         headset: True if trials can be played with a VR headset.
         floor_plan: True if the run directory of the task includes a floor plan with the participant's path.
         rehearsal: True if all participants are simulated.
-        film_required: True if participants must play the film to its end.
-        explains_markers: True if the instructions of a trial show a picture of the condition's markers.
-        consent_version: The researcher's version of the consent text.
     """
 
-    name: str
-    title: str
-    language: str
-    phases: tuple[str, ...]
     texts: Texts
     story: str
-    minimum: Mapping[str, float]
-    optional: frozenset[str]
-    limits: Limits
-    device: Device
-    minutes: float
     cells: Sequence[CellQuota]
-    rule: Rule
     trials: Callable[[Assignment], Mapping[str, dict[str, Any]]]
     recruiter: Recruiter
     film: Path | None = None
@@ -96,9 +96,6 @@ class VisitPlan:
     headset: bool = False
     floor_plan: bool = False
     rehearsal: bool = False
-    film_required: bool = False
-    explains_markers: bool = False
-    consent_version: str = "1"
 
     @property
     def has_picture(self) -> bool:

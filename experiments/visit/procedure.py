@@ -121,7 +121,7 @@ class Procedure:
         """Assign the participant to a cell if needed. Return the place, or None if all cells are full."""
         plan = self.plan
         return await self.store.assign(
-            person.id, plan.cells, plan.rule, self._rng, abandoned_after=self._away
+            person.id, plan.cells, plan.assignment, self._rng, abandoned_after=self._away
         )
 
     async def begin_playing(self, person: PersonRow, place: Assignment) -> VisitFolder:
@@ -253,7 +253,7 @@ class BrowserPlayer:
             floor_plan=procedure.plan.floor_plan and phase == TASK,
             language=procedure.plan.language,
             texts=dict(procedure.plan.texts["hud"].words),
-            explains_markers=procedure.plan.explains_markers,
+            explains_markers=procedure.plan.explain_markers,
         )
         return LiveTrial(phase, time.monotonic() + wait, opening)
 

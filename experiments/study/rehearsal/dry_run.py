@@ -192,7 +192,7 @@ class _Walk:
                 continue
             quotas = zip(plan.cells, conditions, strict=True)
             cells = [replace(quota, wanted=PLACES * (condition == name)) for quota, condition in quotas]
-            await store.assign(person.id, cells, plan.rule, np.random.default_rng(0))
+            await store.assign(person.id, cells, plan.assignment, np.random.default_rng(0))
             await store.finish_phase(person.id, person.phase, TASK, {})
             await self._photograph(f"{TASK}-{name}", f"{around.base}{one.link}", "")
             origin = {"Origin": around.base}

@@ -14,7 +14,7 @@ class Film(FormPhase):
     """The page with the film of the house. If the browser cannot play it, the participant may continue without it."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
-        return {"required": self._plan.film_required, "poster": self._plan.poster}
+        return {"required": self._plan.require_film, "poster": self._plan.poster}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
         read = super().read(visitor, sent)
@@ -23,12 +23,12 @@ class Film(FormPhase):
         found = {name: _number(sent.get(name, "")) for name in (PLAYED_S, FILM_S, ERROR)}
         measured = {name: number for name, number in found.items() if number is not None}
         unplayed = measured.get(PLAYED_S, 0.0) < ENOUGH * measured.get(FILM_S, math.inf)
-        if self._plan.film_required and unplayed and ERROR not in measured:
+        if self._plan.require_film and unplayed and ERROR not in measured:
             return Again(self.texts["not_played"])
         return Done({**read.answers, **measured})
 
     def example(self) -> dict[str, str]:
-        played = {PLAYED_S: "1", FILM_S: "1"} if self._plan.film_required else {}
+        played = {PLAYED_S: "1", FILM_S: "1"} if self._plan.require_film else {}
         return {**super().example(), **played}
 
 

@@ -1,7 +1,6 @@
 """The file of `mjsim study init`, with the phase and the survey of the docs, goes through all commands."""
 
 import asyncio
-import dataclasses
 import re
 import subprocess
 import sys
@@ -9,6 +8,7 @@ from contextlib import AsyncExitStack
 from pathlib import Path
 
 import httpx
+import msgspec
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -83,7 +83,7 @@ async def take_part(path, folder, film_file, people, leaves=()):
     """
     study = read_people_study(path)
     store = await Store.open(sqlite_url(folder / "study.db"), study.settings.name, study.sha256, create=False)
-    plan = dataclasses.replace(plan_of(study, film_file), rehearsal=True, minimum={})
+    plan = msgspec.structs.replace(plan_of(study, film_file), rehearsal=True, minimum={})
     procedure = Procedure(plan, store, VisitFolders(folder / "visits"), np.random.default_rng(0))
     house = study.cells[0].trial(0).house
     server = VisitServer(procedure, WorkerPool(house), ServerOptions(b"secret", workers=2))
