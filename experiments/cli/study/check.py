@@ -1,6 +1,7 @@
 """`mjsim study check`: check that a study is ready to start."""
 
 import argparse
+import itertools
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -82,12 +83,12 @@ def run(arguments: argparse.Namespace) -> int:
     _print_length(study, seconds, shortest, longest)
     _print_cost(study)
     _print_power(study, arguments)
-    problems = [*problems_of_file(study), *problems_of_length(study, shortest, longest)]
-    for line in (*walked.faults, *located(study, problems)):
+    found = problems_of_file(study), problems_of_length(study, shortest, longest)
+    problems = [*walked.faults, *located(study, itertools.chain(*found))]
+    for line in problems:
         print(f"problem   {line}")
-    found = len(walked.faults) + len(problems)
-    print("ready     all phases passed" if not found else f"not ready (problems: {found})")
-    return 1 if found else 0
+    print(f"not ready (problems: {len(problems)})" if problems else "ready     all phases passed")
+    return 1 if problems else 0
 
 
 def _recruiter(study: "Study") -> "Recruiter":

@@ -1,7 +1,6 @@
 """Check a study file for problems before participants are recruited."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 
 from experiments.errors import ConfigError
 from experiments.study.file import Study
@@ -20,24 +19,13 @@ NAMED = {
 }
 
 
-@dataclass(frozen=True)
-class Problem:
-    """A problem found in a study file.
-
-    Attributes:
-        key: Key of the setting that causes the problem, such as `study.contact`.
-    """
-
-    key: str
-    text: str
+Problem = tuple[
+    str, str
+]  # key of the setting in the table `[study]` that causes a problem, and a description
 
 
-def problems_of_file(study: Study) -> list[Problem]:
-    """Return all problems that can be found without a simulation of the study."""
-    return [Problem(f"study.{key}", text) for key, text in _found(study)]
-
-
-def _found(study: Study) -> Iterator[tuple[str, str]]:
+def problems_of_file(study: Study) -> Iterator[Problem]:
+    """Yield all problems that can be found without a simulation of the study."""
     settings, pay = study.settings, study.settings.pay
     if "@" not in settings.contact or any(word in settings.contact for word in EXAMPLES):
         yield "contact", f"contact is {settings.contact!r}; participants need a working address"
@@ -79,17 +67,16 @@ def _lacks(study: Study) -> list[str]:
     return [about for about, any_of in words.items() if not any(word.casefold() in text for word in any_of)]
 
 
-def problems_of_length(study: Study, shortest: float, longest: float) -> list[Problem]:
-    """Return a problem if the announced duration of a study differs too much from the expected duration."""
+def problems_of_length(study: Study, shortest: float, longest: float) -> Iterator[Problem]:
+    """Yield a problem if the announced duration of a study differs too much from the expected duration."""
     told, low, high = study.settings.minutes, shortest / 60, longest / 60
     if 0.8 * low <= told <= 2.5 * high and told >= 0.8 * high:
-        return []
+        return
     span = f"{low:.0f}" if round(low) == round(high) else f"{low:.0f} to {high:.0f}"
-    text = f"minutes is {told}, but the study is expected to take {span} with simulated people"
-    return [Problem("study.minutes", text)]
+    yield "minutes", f"minutes is {told}, but the study is expected to take {span} with simulated people"
 
 
-def located(study: Study, problems: Sequence[Problem]) -> list[str]:
+def located(study: Study, problems: Iterable[Problem]) -> list[str]:
     file = TomlFile.read(study.path, "study")
-    lines = [(file.line(problem.key) or 1, problem.text) for problem in problems]
+    lines = [(file.line(f"study.{key}") or 1, text) for key, text in problems]
     return [f"{study.path}, line {line}: {words}" for line, words in sorted(lines)]
