@@ -1,8 +1,6 @@
 """`mjsim compare`: compare assistance conditions between the trials of a batch, which are paired by seed."""
 
 import argparse
-import csv
-import dataclasses
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from experiments.cli.doctor import require_extra
 from experiments.cli.options import add_command, add_force, text_list
 from experiments.errors import ConfigError
-from mjsim.support.files import replacing
+from mjsim.support.files import write_text_atomically
 
 if TYPE_CHECKING:
     from experiments.analysis.comparison import Difference, Interval
@@ -106,17 +104,17 @@ def _with_interval(value: float | None, interval: "Interval") -> str:
 
 
 def _write_csv(path: Path, differences: "Sequence[Difference]", origin: str) -> None:
-    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        names = ("first", "second", "first_mean", "second_mean", "low", "high", "effect_low", "effect_high")
-        writer.writerow(("origin", "block", "metric", "pairs", "difference", "effect", "p", *names))
-        for d in differences:
-            values = dataclasses.asdict(d)
-            pairs = (*d.conditions, *d.means, *(d.interval or ("", "")), *(d.effect_interval or ("", "")))
-            writer.writerow(
-                (
-                    origin,
-                    *(values[n] for n in ("block", "metric", "pairs", "difference", "effect", "p")),
-                    *pairs,
-                )
-            )
+    from experiments.record.files import csv_text
+
+    single = ("block", "metric", "pairs", "difference", "effect", "p")
+    pairs = ("first", "second", "first_mean", "second_mean", "low", "high", "effect_low", "effect_high")
+    none = "", ""
+    rows = (
+        (
+            origin,
+            *(getattr(d, name) for name in single),
+            *(*d.conditions, *d.means, *(d.interval or none), *(d.effect_interval or none)),
+        )
+        for d in differences
+    )
+    write_text_atomically(path, csv_text(("origin", *single, *pairs), rows))
