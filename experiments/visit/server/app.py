@@ -135,9 +135,6 @@ class VisitServer:
                     await self._host.leave()
             await self._store.close()
 
-    async def _show(self, request: Request) -> Response:
-        return await self._show_phase(request, await self._person(request))
-
     async def _submit(self, request: Request) -> Response:
         person, form = await self._person(request), await sent_form(request)
         async with self._lock(person):
@@ -211,7 +208,8 @@ class VisitServer:
             return
         await self._trials.play(socket, person)
 
-    async def _show_phase(self, request: Request, person: PersonRow) -> Response:
+    async def _show(self, request: Request) -> Response:
+        person = await self._person(request)
         async with self._lock(person):
             now = await self._procedure.now(person, request.url.path)
             if isinstance(now.phase, TrialPhase):
