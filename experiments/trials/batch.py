@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from experiments.errors import ConfigError
 from experiments.house import House
 from experiments.record.archive import WAIT_S, adopt, new_archive, pack
@@ -238,7 +240,7 @@ def _run(config: TrialConfig, out: Path, folder: Path, archives: str | None) -> 
                         shutil.rmtree(out)
         except Exception as error:  # an error in one trial must not stop the others
             return _failure(error).replace(str(run), str(out))
-    return trial if archives is None else dataclasses.replace(trial, path=out, stamp=UNSTAMPED)
+    return trial if archives is None else msgspec.structs.replace(trial, path=out, stamp=UNSTAMPED)
 
 
 def _failure(error: BaseException) -> str:

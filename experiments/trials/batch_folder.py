@@ -13,9 +13,10 @@ import json
 import os
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import msgspec
 
 from experiments.errors import RecordError
 from experiments.record import records
@@ -41,8 +42,7 @@ CHECKED = (records.EVENTS, records.TRAJECTORY, records.EPISODE, records.RECORDIN
 Stamp = tuple[tuple[int, int] | None, ...]
 
 
-@dataclass(frozen=True)
-class StoredTrial:
+class StoredTrial(msgspec.Struct, frozen=True, array_like=True, dict=True):
     """A trial that is stored in a batch folder.
 
     Attributes:
@@ -53,9 +53,9 @@ class StoredTrial:
     """
 
     path: Path
-    settings: Mapping[str, Any]
-    inputs: Inputs
-    row: Mapping[str, Any]
+    settings: dict[str, Any]
+    inputs: dict[str, str]
+    row: dict[str, Any]
     as_measured: bool
     stamp: Stamp
 
@@ -125,7 +125,7 @@ def _start(path: Path) -> Event:
     return start
 
 
-def _metrics(path: Path) -> Mapping[str, Any]:
+def _metrics(path: Path) -> dict[str, Any]:
     try:
         written = read_json(path / records.METRICS)
     except RecordError:
@@ -181,7 +181,7 @@ def write_rows(
     """Write the result tables of a batch folder. Return the rows, starting with the trials of the design."""
     for note in folder_notes(found, unusable):
         on_note(note)
-    rows = [trial.row for trial in in_order(trials, found)]
+    rows: list[Mapping[str, Any]] = [trial.row for trial in in_order(trials, found)]
     if rows:
         write_tables(out, rows)
     return rows

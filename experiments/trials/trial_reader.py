@@ -5,16 +5,15 @@ modification times of the files of the trial. A trial is read again if its files
 changed. The cache may be deleted at any time.
 """
 
-import dataclasses
 import gzip
 import zlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import msgspec
+from msgspec.structs import replace
 
 from experiments.errors import RecordError
 from experiments.record.archive import opened_run, run_paths
@@ -31,16 +30,7 @@ POOL_FROM = 500  # minimum number of unread trials for which worker processes sa
 OnRead = Callable[[int, int], None]  # called with the number of trials read so far and the total number
 
 
-class _CachedRow(msgspec.Struct, array_like=True, frozen=True, gc=False):
-    name: str
-    stamp: Stamp
-    settings: dict[str, Any]
-    inputs: dict[str, str]
-    row: dict[str, Any]
-    as_measured: bool
-
-
-_DECODER, _ENCODER = msgspec.json.Decoder(_CachedRow), msgspec.json.Encoder()
+_ENCODER = msgspec.json.Encoder(enc_hook=lambda path: path.name)  # the cache contains no folders
 
 
 class TrialReader:
@@ -67,7 +57,7 @@ class TrialReader:
         self._names, self._label = names, label
         self._workers, self._on_read = workers, on_read
         files = [self._file] if names is not None else sorted(out.glob(_rows_file("*")))
-        self._known = {row.name: self._trial(row) for file in files for row in _load(file)}
+        self._known = {trial.path.name: trial for file in files for trial in _load(file, self._trials)}
         self._saved = dict(self._known)
 
     def add(self, trial: StoredTrial) -> None:
@@ -102,12 +92,7 @@ class TrialReader:
         trial = self._known.get(path.name)
         if trial is None or trial.stamp not in (stamp, UNSTAMPED):
             return None
-        return dataclasses.replace(trial, stamp=stamp) if trial.stamp == UNSTAMPED else trial
-
-    def _trial(self, row: _CachedRow) -> StoredTrial:
-        return StoredTrial(
-            self._trials / row.name, row.settings, row.inputs, row.row, row.as_measured, row.stamp
-        )
+        return replace(trial, stamp=stamp) if trial.stamp == UNSTAMPED else trial
 
     def _save(self) -> None:
         kept = {name: trial for name, trial in self._known.items() if trial.complete}
@@ -115,9 +100,7 @@ class TrialReader:
             return
         with suppress(OSError), replacing(self._file) as path, gzip.open(path, "wb", compresslevel=1) as file:
             file.write(_header())
-            for name, t in kept.items():
-                row = _CachedRow(name, t.stamp, dict(t.settings), dict(t.inputs), dict(t.row), t.as_measured)
-                file.write(_ENCODER.encode(row) + b"\n")
+            file.writelines(_ENCODER.encode(trial) + b"\n" for trial in kept.values())
         self._saved = kept
 
 
@@ -145,13 +128,14 @@ def _header() -> bytes:
     return f"{source_digest(*CODE)}\n".encode()
 
 
-def _load(file: Path) -> Iterable[_CachedRow]:
+def _load(file: Path, trials: Path) -> Iterable[StoredTrial]:
+    decoder = msgspec.json.Decoder(StoredTrial, dec_hook=lambda _, name: trials / name)
     if not file.is_file():
         return []
     try:
         with gzip.open(file, "rb") as lines:
             if lines.readline() == _header():
-                return [_DECODER.decode(line) for line in lines]
+                return [decoder.decode(line) for line in lines]
     except (OSError, EOFError, zlib.error, msgspec.DecodeError, UnicodeDecodeError):
         pass
     return []
@@ -162,6 +146,6 @@ def _read(path: Path) -> StoredTrial | str:
     stamp = stamp_of(path)
     try:
         with opened_run(path) as run:
-            return dataclasses.replace(read_trial(run), path=listed, stamp=stamp)
+            return replace(read_trial(run), path=listed, stamp=stamp)
     except (RecordError, OSError, KeyError, TypeError, ValueError) as error:
         return str(error)

@@ -124,7 +124,7 @@ def test_a_trial_that_is_gone_is_forgotten(folder):
     TrialReader(folder).read()
     shutil.rmtree(folder / "trials" / "t1")
     assert [trial.path.name for trial in TrialReader(folder).read()[0]] == ["t0", "t2"]
-    assert len(trial_reader._load(folder / ROWS)) == 2
+    assert len(trial_reader._load(folder / ROWS, folder / "trials")) == 2
 
 
 @pytest.mark.parametrize("damage", ["cut", "flip", "text", "empty", "code", "shape"])
