@@ -1,11 +1,11 @@
-"""An interface for payments through recruitment platforms, and an HTTP client for platform APIs."""
+"""The common part of clients that make payments through the APIs of recruitment platforms."""
 
 import asyncio
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import Any, Protocol
+from typing import Any
 
 import httpx
 
@@ -15,7 +15,6 @@ from experiments.visit.store.values import PaymentKind
 TIMEOUT = 30.0  # timeout for a complete response in seconds; other processes may retry after ten minutes
 # Maximum number of attempts for a rate-limited request, and maximum delay between two attempts, in seconds
 TRIES, LONGEST_WAIT = 4, 60.0
-LISTED_AFTER = timedelta(minutes=10)
 MAX_TEXT = 300  # maximum length of a platform's error message, in characters
 TOO_MANY = 429
 
@@ -69,34 +68,28 @@ class Order:
         return value
 
 
-class Payer(Protocol):
-    """A client that makes payments through a platform. Its methods raise DeclinedError or UnsureError.
+class Payer:
+    """A client that makes payments through the API of a platform. It raises DeclinedError or UnsureError.
 
     Attributes:
         listed_after: Time until the platform's lists reliably show the outcome of a request.
         shortest_reason: Minimum length of the reason for a rejection, in characters.
     """
 
-    listed_after: timedelta
-    shortest_reason: int
-
-    async def find(self, order: Order) -> str | None:
-        """Return the reference of the payment in the platform's lists, or None if it has not been made."""
-        ...
-
-    async def send(self, order: Order) -> str:
-        """Make a payment, and return its reference. Raises UnsureError if the outcome is unknown."""
-        ...
-
-    async def close(self) -> None: ...
-
-
-class Api:
-    """An HTTP client for the API of a recruitment platform."""
+    listed_after = timedelta(minutes=10)
+    shortest_reason = 1
 
     def __init__(self, url: str, headers: Mapping[str, str]) -> None:
         self._timeout = TIMEOUT
         self._client = httpx.AsyncClient(base_url=url, headers=headers, timeout=TIMEOUT)
+
+    async def find(self, order: Order) -> str | None:
+        """Return the reference of the payment in the platform's lists, or None if it has not been made."""
+        raise NotImplementedError
+
+    async def send(self, order: Order) -> str:
+        """Make a payment, and return its reference. Raises UnsureError if the outcome is unknown."""
+        raise NotImplementedError
 
     async def ask(self, method: str, path: str, **request: Any) -> Any:
         """Send a request and return the JSON of the response, or None if it is empty.
@@ -133,19 +126,6 @@ class Api:
             raise StoppedError(f"the platform cannot be reached: {error}") from error
         except (httpx.HTTPError, TimeoutError) as error:
             raise UnsureError(f"no answer of the platform: {str(error) or type(error).__name__}") from error
-
-
-class ApiPayer:
-    """The common part of payers, which send requests to the API of their platform."""
-
-    listed_after = LISTED_AFTER
-    shortest_reason = 1
-
-    def __init__(self, url: str, headers: Mapping[str, str]) -> None:
-        self._api = Api(url, headers)
-
-    async def close(self) -> None:
-        await self._api.close()
 
 
 def secret(name: str) -> str:

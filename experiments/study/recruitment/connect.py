@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from experiments.study.file import Recruitment
-from experiments.study.payments.platform import ApiPayer, Order, secret
+from experiments.study.payments.platform import Order, Payer, secret
 from experiments.visit.recruiter import Candidate, InvalidLink, Leaving, WayBack
 
 PERSON, ASSIGNMENT, PROJECT = "participantId", "assignmentId", "projectId"
@@ -45,7 +45,7 @@ class Connect:
         return WayBack(self._code, f"{self._site}/participant/project/{self._code}/complete")
 
 
-class ConnectPayer(ApiPayer):
+class ConnectPayer(Payer):
     """A payment client for CloudResearch Connect, which pays the reward when an assignment is approved."""
 
     def __init__(self, settings: Recruitment) -> None:
@@ -53,7 +53,7 @@ class ConnectPayer(ApiPayer):
 
     async def find(self, order: Order) -> str | None:
         """Look for a payment in the status of the assignment or in the sum of its bonuses."""
-        listed = await self._api.ask("GET", f"/assignments/{order.id(PROJECT)}")
+        listed = await self.ask("GET", f"/assignments/{order.id(PROJECT)}")
         mine: Mapping[str, Any] = next(
             (one for one in listed["assignments"] or () if one[ASSIGNMENT] == order.id(ASSIGNMENT)), {}
         )
@@ -72,5 +72,5 @@ class ConnectPayer(ApiPayer):
             body = {"bonusPayment": [{**row, "amount": order.cents / 100}]}
         token = {"IDEMPOTENCY-TOKEN": f"{order.key}-{order.attempt}"}
         path = f"/assignments/{order.id(PROJECT)}/{action}"
-        await self._api.ask("POST", path, json=body, headers=token)
+        await self.ask("POST", path, json=body, headers=token)
         return action

@@ -12,7 +12,7 @@ from typing import Any
 
 from experiments.errors import ConfigError
 from experiments.study.file import Recruitment
-from experiments.study.payments.platform import ApiPayer, Order, UnsureError, secret
+from experiments.study.payments.platform import Order, Payer, UnsureError, secret
 from experiments.visit.recruiter import Candidate, InvalidLink, Leaving, Preview, WayBack
 
 ASSIGNMENT, TASK, PERSON, SITE = "assignmentId", "hitId", "workerId", "turkSubmitTo"
@@ -55,7 +55,7 @@ class ExternalQuestion:
         return WayBack(url=f"{site}{SUBMIT}", fields={ASSIGNMENT: identity[ASSIGNMENT], "study": "finished"})
 
 
-class ExternalQuestionPayer(ApiPayer):
+class ExternalQuestionPayer(Payer):
     """A payment client for platforms that pay the reward of a task when the assignment is approved."""
 
     def __init__(self, settings: Recruitment) -> None:
@@ -97,7 +97,7 @@ class ExternalQuestionPayer(ApiPayer):
 
     async def _ask(self, operation: str, body: Mapping[str, Any]) -> Any:
         target = {"X-Amz-Target": f"{OPERATIONS}.{operation}"}
-        answer = await self._api.ask("POST", "/", content=json.dumps(body), headers=target)
+        answer = await self.ask("POST", "/", content=json.dumps(body), headers=target)
         if not isinstance(answer, dict):
             raise UnsureError("the platform's answer is no JSON")
         return answer

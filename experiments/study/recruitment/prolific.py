@@ -7,7 +7,7 @@ from typing import Any
 from urllib.parse import urlencode
 
 from experiments.study.file import Recruitment
-from experiments.study.payments.platform import ApiPayer, DeclinedError, Order, UnsureError, secret
+from experiments.study.payments.platform import DeclinedError, Order, Payer, UnsureError, secret
 from experiments.visit.recruiter import Candidate, InvalidLink, Leaving, WayBack
 
 PERSON, STUDY, SUBMISSION = "PROLIFIC_PID", "STUDY_ID", "SESSION_ID"
@@ -49,7 +49,7 @@ class Prolific:
         return WayBack(code, f"{self._site}/submissions/complete?{urlencode({'cc': code})}")
 
 
-class ProlificPayer(ApiPayer):
+class ProlificPayer(Payer):
     """A payment client for Prolific, which pays the reward of a study when a submission is approved.
 
     The payment for screened-out participants is set on the platform. Partial payments are made as bonuses,
@@ -66,7 +66,7 @@ class ProlificPayer(ApiPayer):
 
     async def find(self, order: Order) -> str | None:
         """Look for a payment in the status of the submission or in the amounts of its bonuses."""
-        submission = await self._api.ask("GET", f"/submissions/{order.id(SUBMISSION)}/")
+        submission = await self.ask("GET", f"/submissions/{order.id(SUBMISSION)}/")
         done = {"reward": "APPROVED", "screen_out": "SCREENED OUT", "rejection": "REJECTED"}.get(order.kind)
         if done is not None:
             return done.lower() if submission["status"] == done else None
@@ -83,10 +83,10 @@ class ProlificPayer(ApiPayer):
         }
         submission = order.id(SUBMISSION)
         if change := changes.get(order.kind):
-            answer = await self._api.ask("POST", f"/submissions/{submission}/transition/", json=change)
+            answer = await self.ask("POST", f"/submissions/{submission}/transition/", json=change)
             return str(answer["status"]).lower()
         bonus = await self._prepare(order)
-        await self._api.ask("POST", f"/bulk-bonus-payments/{bonus}/pay/")
+        await self.ask("POST", f"/bulk-bonus-payments/{bonus}/pay/")
         return f"bonus {bonus}"
 
     async def _prepare(self, order: Order) -> str:
@@ -95,6 +95,6 @@ class ProlificPayer(ApiPayer):
             "csv_bonuses": f"{order.id(SUBMISSION)},{order.amount}",
         }
         try:
-            return str((await self._api.ask("POST", "/submissions/bonus-payments/", json=row))["id"])
+            return str((await self.ask("POST", "/submissions/bonus-payments/", json=row))["id"])
         except UnsureError as error:
             raise DeclinedError(f"the bonus could not be prepared: {error}") from error

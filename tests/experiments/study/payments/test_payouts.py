@@ -108,7 +108,7 @@ class Paid:
         async def run():
             store = await self.open()
             client = payer(self.study.settings)
-            client._api._timeout = timeout
+            client._timeout = timeout
             try:
                 return [sent async for sent in Sender("paid", store, client).send()]
             finally:

@@ -15,9 +15,9 @@ from experiments.study.payments.platform import (
     TIMEOUT,
     TOO_MANY,
     TRIES,
-    Api,
     DeclinedError,
     Order,
+    Payer,
     StoppedError,
     UnsureError,
     secret,
@@ -38,7 +38,7 @@ def asked(monkeypatch, headers, busy):
         pauses.append(seconds)
 
     async def run():
-        api = Api("http://platform.example", {})
+        api = Payer("http://platform.example", {})
         transport = httpx.MockTransport(lambda _: next(answers, httpx.Response(200, json="paid")))
         api._client = httpx.AsyncClient(base_url="http://platform.example", transport=transport)
         try:
@@ -87,7 +87,7 @@ def outcome(answer):
         return answer
 
     async def run():
-        api = Api("http://platform.example", {})
+        api = Payer("http://platform.example", {})
         api._timeout = 0.05
         api._client = httpx.AsyncClient(
             base_url="http://platform.example", transport=httpx.MockTransport(respond)

@@ -37,8 +37,9 @@ def payer(kind, monkeypatch, *answers):
         monkeypatch.setenv(f"MJSIM_{name}", "secret")
     found = kind(SETTINGS)
     asyncio.run(found.close())
-    found._api = Api(*answers)
-    return found, found._api
+    api = Api(*answers)
+    monkeypatch.setattr(found, "ask", api.ask)
+    return found, api
 
 
 def order(kind, cents=250, others=()):
