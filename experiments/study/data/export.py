@@ -8,6 +8,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from experiments.analysis.study.measures import LIKERT_PREFIX
 from experiments.errors import RecordError
 from experiments.record.files import csv_text, replacing_folder, write_json
@@ -17,7 +19,7 @@ from experiments.study.file import Study
 from experiments.trials.table import trial_columns
 from experiments.visit.plan import SURVEY
 from experiments.visit.procedure import ATTEMPTS
-from experiments.visit.store import Answer, PersonRow, Store, TrialRow
+from experiments.visit.store import Answer, PersonRow, Store
 from experiments.visit.texts.items import Item
 from mjsim.support.files import write_text_atomically
 
@@ -44,8 +46,7 @@ OWN = {
 }
 
 
-@dataclass(frozen=True)
-class Variable:
+class Variable(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="@type", tag="PropertyValue"):
     """A table column and its description in the codebook.
 
     Attributes:
@@ -54,19 +55,9 @@ class Variable:
 
     name: str
     description: str
-    low: float | None = None
-    high: float | None = None
-    levels: tuple[str, ...] = ()
-
-    def as_json(self) -> dict[str, Any]:
-        found: dict[str, Any] = {"@type": "PropertyValue", "name": self.name, "description": self.description}
-        if self.low is not None:
-            found["minValue"] = self.low
-        if self.high is not None:
-            found["maxValue"] = self.high
-        if self.levels:
-            found["valueReference"] = list(self.levels)
-        return found
+    low: float | None = msgspec.field(default=None, name="minValue")
+    high: float | None = msgspec.field(default=None, name="maxValue")
+    levels: tuple[str, ...] = msgspec.field(default=(), name="valueReference")
 
 
 @dataclass(frozen=True)
@@ -93,7 +84,9 @@ async def export(study: Study, store: Store, folder: Path, out: Path, *, replace
         raise RecordError(f"no participant in {folder} has finished the task yet; there is nothing to export")
     people = {p.id: p for p in await store.people() if not p.delete_wanted and p.status != "no_consent"}
     trials = [
-        row for row in await store.trials() if row.person_id in people and _name(row) not in found.unusable
+        row
+        for row in await store.trials()
+        if row.person_id in people and person_name(people[row.person_id]) not in found.unusable
     ]
     answers = [row for row in await store.answers() if row.final and row.person_id in people]
     tables: dict[str, Table] = {
@@ -105,7 +98,7 @@ async def export(study: Study, store: Store, folder: Path, out: Path, *, replace
     with replacing_folder(out, 0o700) as made:
         _write(made, study, {name: table for name, table in tables.items() if table})
         for row in trials:
-            shutil.copytree(folder / row.folder, made / RUNS / _name(row) / row.phase)
+            shutil.copytree(folder / row.folder, made / RUNS / person_name(people[row.person_id]) / row.phase)
         (made / INDEX).write_bytes((out / INDEX).read_bytes() if (out / INDEX).is_file() else b"")
         for path in made.rglob("*"):
             path.chmod(0o700 if path.is_dir() else 0o600)
@@ -121,10 +114,6 @@ def check_export(out: Path, *, replace: bool) -> None:
         raise RecordError(f"{out} is there and is no export; name a folder that does not exist yet")
     if not replace:
         raise RecordError(f"{out} is an export already; --force replaces it")
-
-
-def _name(row: TrialRow) -> str:
-    return f"p{row.person_id:05d}"
 
 
 async def _phases(store: Store, people: Mapping[int, PersonRow], answers: Iterable[Answer]) -> Table:
@@ -188,7 +177,7 @@ def _description(study: Study, variables: Sequence[Variable]) -> dict[str, Any]:
         f"{version('mjsim')}. Study file: SHA-256 {study.sha256}.",
         "creator": {"@type": "Organization", "name": study.settings.institution},
         "inLanguage": study.settings.language,
-        "variableMeasured": [variable.as_json() for variable in variables],
+        "variableMeasured": msgspec.to_builtins(variables),
     }
 
 
