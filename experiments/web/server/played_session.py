@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import MutableMapping, Sequence
 from contextlib import suppress
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 
@@ -17,7 +17,7 @@ from experiments.web.controls import Input
 from experiments.web.server.limit import SessionLimit
 from experiments.web.server.player import LiveTrial, Meter, Player
 from experiments.web.server.pool import WorkerPool, WorkerProcess
-from experiments.web.server.spectators import Spectator, Spectators
+from experiments.web.server.spectators import Browser, Spectators
 from experiments.web.state import (
     FAILED,
     LOADING,
@@ -34,12 +34,6 @@ LOG = logging.getLogger("mjsim.play")
 MAX_CRASHES = 3  # number of worker crashes without progress after which a session fails
 MAX_AHEAD = 1000  # maximum number of inputs that have not been processed
 FAILURE = "The session cannot continue at the moment. Nothing is lost: reload this page to try again."
-
-
-class Browser(Spectator, Protocol):
-    """The connection to a participant's page. `tab` is the name of the page."""
-
-    tab: str
 
 
 class PlayedSession:

@@ -2,23 +2,19 @@
 
 from typing import Any, Protocol
 
-import msgspec
+from msgspec.structs import replace
 
 from experiments.web.protocol import IDLE, FrameMessage
 from experiments.web.state import Hud, Markers, Moment, Pictures, SceneMessage, Snapshot, State, WireMessage
 
-KEPT = (
-    State,
-    SceneMessage,
-    Pictures,
-    Hud,
-    Markers,
-    Moment,
-)  # for these types, a new message replaces the previous one
+# For these types, a new message replaces the previous one
+KEPT = (State, SceneMessage, Pictures, Hud, Markers, Moment)
 
 
-class Spectator(Protocol):
-    """The connection to a spectator's page."""
+class Browser(Protocol):
+    """The connection to the page of a participant or a spectator. `tab` is the name of a participant's page."""
+
+    tab: str
 
     def send(self, message: WireMessage) -> None:
         """Queue a message for the page."""
@@ -31,26 +27,20 @@ class Spectators:
     """The spectators of a session, and the latest messages, which new spectators receive first."""
 
     def __init__(self) -> None:
-        self._all: set[Spectator] = set()
+        self._all: set[Browser] = set()
         self._last: dict[type[WireMessage], WireMessage] = {}
-        self._snapshot: Snapshot | None = None
-        self._objects: dict[str, list[float]] = {}
-        self._models: dict[str, str] = {}
+        self._snapshot: Snapshot | None = None  # with all objects that the page knows
 
-    def join(self, spectator: Spectator) -> None:
+    def join(self, spectator: Browser) -> None:
         """Add a spectator and send the current state."""
         self._all.add(spectator)
         for kind in KEPT:
             if kind in self._last:
                 spectator.send(self._last[kind])
         if self._snapshot is not None:
-            spectator.send(
-                msgspec.structs.replace(
-                    self._snapshot, objects=dict(self._objects), models=dict(self._models), gone=[]
-                )
-            )
+            spectator.send(self._snapshot)
 
-    def leave(self, spectator: Spectator) -> None:
+    def leave(self, spectator: Browser) -> None:
         self._all.discard(spectator)
 
     def close(self) -> None:
@@ -61,16 +51,13 @@ class Spectators:
     def tell(self, message: Any) -> None:
         """Forward a message to all spectators, and store it for new spectators."""
         match message:
-            case Snapshot(objects=objects, models=models, gone=gone):
-                self._snapshot = message
-                self._objects |= objects
-                self._models |= models
-                for name in gone:
-                    self._objects.pop(name, None)
-                    self._models.pop(name, None)
+            case Snapshot(gone=gone):
+                before = self._snapshot or message
+                known = before.objects | message.objects, before.models | message.models
+                objects, models = ({k: v for k, v in one.items() if k not in gone} for one in known)
+                self._snapshot = replace(message, objects=objects, models=models, gone=[])
             case SceneMessage() | FrameMessage():  # earlier snapshots are obsolete
                 self._snapshot = None
-                self._objects, self._models = {}, {}
         if isinstance(message, KEPT):
             self._last[type(message)] = message
         if isinstance(message, (*KEPT, Snapshot, FrameMessage)):
