@@ -10,8 +10,9 @@ import os
 import struct
 import time
 import zlib
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import msgspec
 
@@ -67,7 +68,7 @@ _encode = msgspec.msgpack.Encoder().encode
 _DECODER: msgspec.msgpack.Decoder[Header | JournalEntry] = msgspec.msgpack.Decoder(Header | JournalEntry)
 
 
-class Journal:
+class Journal(AbstractContextManager["Journal"]):
     """A journal file, created if it is missing, which only one process can have open at a time.
 
     Attributes:
@@ -113,9 +114,6 @@ class Journal:
 
     def close(self) -> None:
         os.close(self._file)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -1,10 +1,10 @@
 """Render and film the first-person view with the HUD."""
 
-import contextlib
 import dataclasses
 import math
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from mjsim.values.observation import Observation
 from mjsim.world.world import World
 
 
-class FirstPersonRenderer:
+class FirstPersonRenderer(AbstractContextManager["FirstPersonRenderer"]):
     """A renderer of first-person frames with the HUD. Use it as a context manager to free the GL context.
 
     Raises RenderError if there is no off-screen GL context, or if the size or the profile is invalid.
@@ -73,9 +73,6 @@ class FirstPersonRenderer:
 
     def close(self) -> None:
         self._renderer.close()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -140,7 +137,7 @@ class TrialFilm:
             self._give_up(error)
         if self._renderer is not None:
             # after a driver failure, freeing the GL context may fail as well
-            with contextlib.suppress(RenderError):
+            with suppress(RenderError):
                 self._renderer.close()
         if self.failure is not None:
             self._path.unlink(missing_ok=True)

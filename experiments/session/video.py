@@ -4,10 +4,9 @@ import hashlib
 import queue
 import threading
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from fractions import Fraction
 from pathlib import Path
-from typing import Self
 
 import av
 import numpy as np
@@ -19,7 +18,7 @@ Image = NDArray[np.uint8]
 QUEUE_LENGTH = 8  # maximum number of frames that wait to be encoded
 
 
-class VideoWriter:
+class VideoWriter(AbstractContextManager["VideoWriter"]):
     """A writer of MP4 files. Use it as a context manager so that the file is completed.
 
     Width and height in pixels must be even because chroma is subsampled (4:2:0). Raises RecordError if one of them is
@@ -58,9 +57,6 @@ class VideoWriter:
         self._queue.put(None)
         self._thread.join()
         self._raise_failure()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
