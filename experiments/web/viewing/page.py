@@ -40,14 +40,15 @@ def view_page(
         RecordError: `directory` is not a run directory.
         ReplayError: The run cannot be replayed, or the replay differs from the record.
     """
-    watched: list[tuple[Replayer, RunRecorder]] = []
+    watched: list[Replayer] = []
+    seen = RunRecorder()
 
     def watch(replayer: Replayer) -> RunRecorder:
-        watched.append((replayer, RunRecorder(replayer.scene)))
-        return watched[0][1]
+        watched.append(replayer)
+        return seen
 
     replay(directory, watch=watch, catalogue=catalogue, on_progress=on_progress)
-    ((replayer, seen),) = watched
+    (replayer,) = watched
     record, house = replayer.record, replayer.house
     models = {placed.model for placed in record.episode.objects}
     return run_page(_title(record), _run(record, house, seen), _scene(house, models))

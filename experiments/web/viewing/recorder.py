@@ -10,7 +10,6 @@ from experiments.session.session import Viewer
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.house.scene import avatar
-from mjsim.house.scene.scene import Scene
 from mjsim.render.cameras import camera_pose
 from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PICTURE_ASPECT
@@ -33,8 +32,7 @@ class RunRecorder(Viewer):
         shown: Pairs of a control step and indices into `markers`, one for each change of the visible markers.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self._model = scene.model
+    def __init__(self) -> None:
         self.time: list[float] = []
         self.body: list[float] = []
         self.hands: list[float] = []

@@ -27,7 +27,7 @@ def seen(run):
     found = []
 
     def watch(replayer):
-        found.append((RunRecorder(replayer.scene), replayer.house))
+        found.append((RunRecorder(), replayer.house))
         return found[0][0]
 
     replay(run[0], watch=watch)
