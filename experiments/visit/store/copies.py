@@ -6,7 +6,6 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from sqlalchemy import func, insert, select, text
 from sqlalchemy.ext.asyncio import AsyncConnection
@@ -105,14 +104,9 @@ async def _copy(source: Database, target: Database) -> None:
 
         async def work(writing: AsyncConnection) -> None:
             for table in metadata.sorted_tables:
-                rows: list[dict[str, Any]] = []
-                async for row in await reading.stream(select(table).order_by(table.c.id)):
-                    rows.append(dict(row._mapping))
-                    if len(rows) == ROWS:
-                        await writing.execute(insert(table), rows)
-                        rows = []
-                if rows:
-                    await writing.execute(insert(table), rows)
+                found = await reading.stream(select(table).order_by(table.c.id))
+                async for rows in found.mappings().partitions(ROWS):
+                    await writing.execute(insert(table), [dict(row) for row in rows])
                 if target.kind == "postgresql":  # explicit ids do not advance PostgreSQL's sequences
                     last = (await writing.execute(select(func.max(table.c.id)))).scalar() or 0
                     after = f"pg_get_serial_sequence('{table.name}', 'id'), {last + 1}, false"

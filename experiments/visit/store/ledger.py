@@ -50,12 +50,11 @@ class Ledger(StorePart):
                 is not valid.
         """
         _check(kind, cents, currency)
-        same = (person_id, kind, cents, currency)
         values: dict[str, Any] = {"person_id": person_id, "kind": kind, "cents": cents, "currency": currency}
         events = await self._events(connection, key)
         if events:
             first = events[0]
-            if (first.person_id, first.kind, first.cents, first.currency) == same:
+            if _same(first) == values:
                 return False
             raise StoreError(
                 f"Payment {key!r} is {first.kind} of {first.cents} cents {first.currency} for person "
@@ -162,12 +161,7 @@ def _check(kind: str, cents: int, currency: str) -> None:
 
 
 def _same(event: PaymentEvent) -> dict[str, Any]:
-    return {
-        "person_id": event.person_id,
-        "kind": event.kind,
-        "cents": event.cents,
-        "currency": event.currency,
-    }
+    return {name: getattr(event, name) for name in ("person_id", "kind", "cents", "currency")}
 
 
 async def events_of(connection: Connection, *which: ColumnElement[bool]) -> Sequence[PaymentEvent]:
