@@ -156,10 +156,9 @@ def _run(words: list[str]) -> int:
     commands = parser(*known)
     if bad := next((word for word in words if word.startswith("--") and word.endswith("=--")), None):
         commands.error(f"{bad} has no value")  # argparse would turn the missing value into an empty list
+    # an empty path would be the current folder
     if "" in words or any(word.startswith("--") and word.endswith("=") for word in words):
-        commands.error(
-            "an argument is empty; give a value, or leave it out"
-        )  # an empty path is the current folder
+        commands.error("an argument is empty; give a value, or leave it out")
     try:
         arguments = commands.parse_args(words)
     except SystemExit:

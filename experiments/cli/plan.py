@@ -152,9 +152,8 @@ class _PlanningThread(threading.Thread):
     def run(self) -> None:
         try:
             for plan in self._plans():
-                self.answered = (
-                    self.best is not None or self._seconds is None
-                )  # if there is a time limit, the first plan comes from a greedy heuristic
+                # if there is a time limit, the first plan comes from a greedy heuristic
+                self.answered = self.best is not None or self._seconds is None
                 self.best = plan
         except BaseException as error:  # custom planners may raise any exception
             self._error = error

@@ -106,10 +106,8 @@ class RecordWriter:
             for name in ("hands", "object_status"):
                 columns[name][rest] = columns[name][first]
         self.time = float(columns["time"][end - 1])
-        self._length, self.step = (
-            end,
-            self.step + len(steps),
-        )  # set last so that an interruption leaves only complete rows
+        # set last so that an interruption leaves only complete rows
+        self._length, self.step = end, self.step + len(steps)
 
     @property
     def last_state_hash(self) -> int:

@@ -1,6 +1,5 @@
 """Merge the shards of a batch: join their folders, write the tables, and find missing trials."""
 
-import dataclasses
 import functools
 import re
 import shutil
@@ -9,6 +8,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import msgspec
 
 from experiments.errors import RecordError
 from experiments.record.archive import adopt, copy, opened_run, run_paths
@@ -100,9 +101,8 @@ def _same(one: Path, other: Path) -> bool:
 
 def _add(part: Path, trials: Mapping[str, StoredTrial], out: Path, reader: TrialReader) -> None:
     trials_folder = out / TRIALS
-    put_aside(
-        out, {path.name for path in run_paths(trials_folder)}.intersection(trials)
-    )  # incomplete or damaged runs
+    broken = {path.name for path in run_paths(trials_folder)}.intersection(trials)
+    put_aside(out, broken)  # these runs are incomplete or damaged
     for name in (name for name in trials if is_run(part / TRIALS / name)):
         with work_folder(trials_folder) as work:
             shutil.copytree(part / TRIALS / name, work / name, copy_function=link_or_copy)
@@ -110,7 +110,7 @@ def _add(part: Path, trials: Mapping[str, StoredTrial], out: Path, reader: Trial
     copy(part / TRIALS, [name for name in trials if not (trials_folder / name).exists()], trials_folder)
     for name, trial in trials.items():
         stamp = trial.stamp if (trials_folder / name).exists() else UNSTAMPED
-        reader.add(dataclasses.replace(trial, path=trials_folder / name, stamp=stamp))
+        reader.add(msgspec.structs.replace(trial, path=trials_folder / name, stamp=stamp))
 
 
 def _missing(trials: Sequence[TrialConfig], stored: Iterable[StoredTrial]) -> list[TrialConfig]:

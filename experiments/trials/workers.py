@@ -89,9 +89,8 @@ class Executor(Protocol):
 
 
 PROCESSES, RAY = "processes", "ray"
-Pools = Callable[
-    [], AbstractContextManager[Executor]
-]  # creates a new executor each time, so that a batch can continue after a crash
+# A function that creates a new executor each time, so that a batch can continue after a crash
+Pools = Callable[[], AbstractContextManager[Executor]]
 # The arguments are a number of workers or None, user modules, a callback for messages, and the work folder.
 EXECUTORS: Mapping[str, Callable[..., AbstractContextManager[Pools]]] = {
     PROCESSES: lambda workers, *_: nullcontext(functools.partial(worker_pool, workers)),

@@ -52,9 +52,8 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 class VisitSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The settings of a visit that a study file contains."""
 
-    name: Annotated[
-        str, msgspec.Meta(pattern=r"^[a-z0-9][a-z0-9-]{0,39}\Z")
-    ]  # name of the study in the database
+    # Name of the study in the database
+    name: Annotated[str, msgspec.Meta(pattern=r"^[a-z0-9][a-z0-9-]{0,39}\Z")]
     title: Annotated[str, msgspec.Meta(pattern=r"\S")]
     minutes: Count = 25  # expected duration of a visit
     language: Annotated[str, msgspec.Meta(pattern=r"^[a-zA-Z]{2,3}(-[a-zA-Z0-9]{2,8})*\Z")] = "en"

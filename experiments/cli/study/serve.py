@@ -63,9 +63,8 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--film", type=Path, metavar="FILE.mp4", help="film of the house (default: one is made)"
     )
-    parser.add_argument(
-        "--rehearsal", type=float, metavar="FACTOR", help=argparse.SUPPRESS
-    )  # hidden option that only `mjsim study rehearse` uses
+    # hidden option that only `mjsim study rehearse` uses
+    parser.add_argument("--rehearsal", type=float, metavar="FACTOR", help=argparse.SUPPRESS)
     server = parser.add_argument_group("server")
     add_server_options(server)
     server.add_argument(

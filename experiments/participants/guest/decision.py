@@ -52,11 +52,8 @@ def first_step_costs(task: Task, look_ahead: int) -> list[float]:
     The cost covers `look_ahead` visits. After the first visit, the guest imagines always choosing the nearest
     possible visit. If the hands are full, picks have an infinite cost.
     """
-    picks, carried, full = (
-        list(range(len(task.picks))),
-        list(task.carried),
-        len(task.carried) >= task.capacity,
-    )
+    picks, carried = list(range(len(task.picks))), list(task.carried)
+    full = len(carried) >= task.capacity
     legs = task.legs.tolist()
     costs = []
     for k in picks:

@@ -19,9 +19,8 @@ NAMED = {
 }
 
 
-Problem = tuple[
-    str, str
-]  # key of the setting in the table `[study]` that causes a problem, and a description
+# The key of the setting in the table `[study]` that causes a problem, and a description of the problem
+Problem = tuple[str, str]
 
 
 def problems_of_file(study: Study) -> Iterator[Problem]:

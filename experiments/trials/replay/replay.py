@@ -196,11 +196,8 @@ def as_seen(record: Record, profile: str) -> FilmConfig:
 
 def _open_film(replayer: Replayer, film: ReplayFilm, stack: ExitStack) -> tuple[Viewer, VideoWriter]:
     path = stack.enter_context(replacing(film.path))
-    config, scene, house = (
-        film.config or as_seen(replayer.record, film.profile),
-        replayer.scene,
-        replayer.house,
-    )
+    config = film.config or as_seen(replayer.record, film.profile)
+    scene, house = replayer.scene, replayer.house
     if film.camera == FIRST_PERSON:
         renderer = stack.enter_context(FirstPersonRenderer(scene, house, config))
         video = stack.enter_context(VideoWriter(path, width=config.width, height=config.height))

@@ -88,10 +88,8 @@ def poster(film: Path) -> str:
 SIZES = ((320, 240), (480, 360), (640, 480), (800, 600), (960, 720))  # possible frame sizes, in pixels
 FIRST_SIZE = 2
 FRAMES = 20  # number of frames from which median times are computed
-SLOW, QUICK = (
-    0.033,
-    0.022,
-)  # frames become smaller above the first frame time, larger below the second, in seconds
+# Times to draw a frame above which frames become smaller, and below which they become larger, in seconds
+SLOW, QUICK = 0.033, 0.022
 HELD_UP = 0.06  # waiting time for the connection above which frames become smaller, in seconds
 SHARE = 0.65  # fraction of time spent on drawing; the rest is left to other sessions
 RETRY = 30.0  # time until a size that was too large is tried again, in seconds

@@ -133,10 +133,8 @@ class LiveSession:
         if record is None:
             self._planner = prepared_planner(config, self.house, self.scene.episode)
         else:
-            logged, evaluator = (
-                LogSource(record.plans, lambda: self.session.time),
-                regret_evaluator(config, self.house),
-            )
+            logged = LogSource(record.plans, lambda: self.session.time)
+            evaluator = regret_evaluator(config, self.house)
             self._planner = Planner(logged, evaluator, live=True)
         log = EventLog()
         self.session, _ = prepare_session(
