@@ -4,6 +4,7 @@ import difflib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from operator import eq, ge, gt, le, lt, ne
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -57,14 +58,7 @@ class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return bool(_COMPARED[self.comparison](found, self.value))
 
 
-_COMPARED: Mapping[str, Any] = {
-    "<": lambda a, b: a < b,
-    "<=": lambda a, b: a <= b,
-    ">": lambda a, b: a > b,
-    ">=": lambda a, b: a >= b,
-    "==": lambda a, b: a == b,
-    "!=": lambda a, b: a != b,
-}
+_COMPARED: Mapping[str, Any] = {"<": lt, "<=": le, ">": gt, ">=": ge, "==": eq, "!=": ne}
 UNFINISHED = Rule("ended", "!=", "did not deliver everything", ALL_DELIVERED)
 
 
