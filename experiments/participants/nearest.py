@@ -18,7 +18,6 @@ class Nearest:
     needs = frozenset({"flagpole"})
 
     def __init__(self, house: House) -> None:
-        self._house = house
         self._executor = VisitExecutor(house)
         self._choice: Visit | None = None
         self._known: dict[str, Point] = {}
