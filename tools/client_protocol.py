@@ -10,11 +10,11 @@ import msgspec
 from msgspec import inspect
 
 from experiments.web import protocol
-from experiments.web.state import TRANSITIONS, SessionPhase
+from experiments.web.state import TRANSITIONS, SessionPhase, Trigger
 
 PATH = Path(__file__).parents[1] / "experiments" / "web" / "client" / "static" / "protocol.js"
 CONSTANTS: tuple[str, ...] = ("MAX_INPUTS", "BEAT_PERIOD", "MAX_SILENCE", "MAX_STEPS_AHEAD")
-CONSTANTS += ("DISPLAY_PERIOD", "KEY_FLAG", "REFUSED", "REPLACED", "IDLE", "TOO_MUCH", "SLOW")
+CONSTANTS += ("DISPLAY_PERIOD", "KEY_FLAG", "REFUSED", "REPLACED", "IDLE", "TOO_MUCH")
 ALIASES = {"Codec": protocol.Codec, "PauseReason": protocol.PauseReason, "Phase": SessionPhase}
 UNIONS = {"FromBrowser": protocol.FromBrowser, "ToBrowser": protocol.ToBrowser}
 _SCALARS: dict[type[inspect.Type], str] = {
@@ -50,12 +50,9 @@ def _constants() -> Iterator[str]:
     codecs = ", ".join(f'{number}: "{name}"' for name, number in protocol.CODECS.items())
     yield f"/** @type {{Record<number, Codec>}} */\nexport const CODECS = {{ {codecs} }};"
     yield from (f"export const {name} = {getattr(protocol, name)};" for name in CONSTANTS)
-    yield "/** @type {Record<Phase, Record<string, Phase>>} phase -> trigger -> phase that follows */"
-    yield "export const TRANSITIONS = {"
-    for phase in SessionPhase:
-        after = (f'{trigger}: "{then}"' for (before, trigger), then in TRANSITIONS.items() if before is phase)
-        yield f"  {phase}: {{ {', '.join(after)} }},"
-    yield "};"
+    startable = ", ".join(f'"{phase}"' for phase, trigger in TRANSITIONS if trigger is Trigger.RUN)
+    yield "/** @type {readonly Phase[]} phases in which the clock can be started */"
+    yield f"export const STARTABLE = [{startable}];"
 
 
 def _literals(alias: Any) -> str:

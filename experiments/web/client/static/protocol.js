@@ -58,13 +58,5 @@ export const REFUSED = 4000;
 export const REPLACED = 4001;
 export const IDLE = 4002;
 export const TOO_MUCH = 4003;
-export const SLOW = 4004;
-/** @type {Record<Phase, Record<string, Phase>>} phase -> trigger -> phase that follows */
-export const TRANSITIONS = {
-  loading: { opened: "ready", restored: "paused", end: "over", fail: "failed" },
-  ready: { run: "running", end: "over", fail: "failed" },
-  running: { pause: "paused", end: "over", fail: "failed" },
-  paused: { run: "running", end: "over", fail: "failed" },
-  over: { fail: "failed" },
-  failed: {  },
-};
+/** @type {readonly Phase[]} phases in which the clock can be started */
+export const STARTABLE = ["ready", "paused"];

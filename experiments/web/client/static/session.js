@@ -2,7 +2,7 @@
 
 /** @import { Phase, State } from "./protocol.js" */
 
-import { TRANSITIONS } from "./protocol.js";
+import { STARTABLE } from "./protocol.js";
 
 export class Session {
   /** @type {Phase} */
@@ -19,9 +19,8 @@ export class Session {
   /** Starts the clock before the server confirms it. Returns false if that is not possible. */
   run() {
     this.wanted = true;
-    const after = TRANSITIONS[this.phase]["run"];
-    if (!after) return false;
-    this.take({ phase: after, reason: "" });
+    if (!STARTABLE.includes(this.phase)) return false;
+    this.take({ phase: "running", reason: "" });
     return true;
   }
 }

@@ -1,11 +1,10 @@
 import { describe, expect, test } from "vitest";
 
-import { TRANSITIONS } from "../static/protocol.js";
 import { Session } from "../static/session.js";
 
 /** @import { Phase } from "../static/protocol.js" */
 
-const PHASES = /** @type {Phase[]} */ (Object.keys(TRANSITIONS));
+const PHASES = /** @type {Phase[]} */ (["loading", "ready", "running", "paused", "over", "failed"]);
 
 /** @param {[Phase, string?][]} states */
 function after(...states) {
@@ -19,17 +18,11 @@ describe("the copy of the state", () => {
     expect(after([phase, "why"])).toMatchObject({ phase, reason: "why" });
   });
 
-  test.each(PHASES)("runs ahead of the server only where the table allows it: %s", (phase) => {
+  test.each(PHASES)("runs ahead of the server only where the clock can be started: %s", (phase) => {
     const session = after([phase]);
     const runs = phase === "ready" || phase === "paused";
     expect(session.run()).toBe(runs);
     expect(session.phase).toBe(runs ? "running" : phase);
-  });
-
-  test("every phase that follows another one is a phase", () => {
-    for (const triggers of Object.values(TRANSITIONS)) {
-      for (const phase of Object.values(triggers)) expect(PHASES).toContain(phase);
-    }
   });
 });
 
