@@ -34,9 +34,8 @@ from planner.solver_source import SolverSource
 
 _SESSION = 77  # keeps the session's random numbers independent of the house's random numbers
 _LIST_ORDER, _CHANCE, _PERSON, _BEHAVIOUR = range(4)  # indices of a session's random streams
-PREPARATION_S = (
-    0.6  # how long a live trial waits for a proof of its first plan, and then for regrets, in seconds
-)
+# How long a live trial waits for a proof of its first plan, and then for regrets, in seconds
+PREPARATION_S = 0.6
 
 
 def draw_person(config: TrialConfig) -> PersonParameters:
