@@ -9,9 +9,9 @@ import tempfile
 import time
 import traceback
 from collections.abc import Sequence
-from importlib import metadata
 from pathlib import Path
 
+from mjsim.support.environment import version_of
 from mjsim.support.urls import redacted
 
 FAILED = 1
@@ -114,16 +114,9 @@ def _report(error: Exception, words: Sequence[str]) -> str:
 
 def _report_text(error: Exception, words: Sequence[str]) -> str:
     command = _SECRET.sub(r"\1\2***", "\x00".join(map(redacted, words))).replace("\x00", " ")
-    versions = "\n".join(f"{name} {_version(name)}" for name in DISTRIBUTIONS)
+    versions = "\n".join(f"{name} {version_of(name) or 'not installed'}" for name in DISTRIBUTIONS)
     trace = redacted("".join(traceback.format_exception(error)))
     text = (
         f"mjsim {command}\npython {platform.python_version()} on {platform.platform()}\n{versions}\n\n{trace}"
     )
     return text.replace(str(Path.home()), "~") if str(Path.home()) != "/" else text
-
-
-def _version(distribution: str) -> str:
-    try:
-        return metadata.version(distribution)
-    except metadata.PackageNotFoundError:
-        return "not installed"

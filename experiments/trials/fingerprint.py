@@ -3,14 +3,12 @@
 If a batch is resumed, trials are rerun if any of these hashes and versions has changed.
 """
 
-import contextlib
 import functools
 import hashlib
 import importlib.util
 import json
 import platform
 from collections.abc import Iterable, Mapping
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from experiments.participants.registry import participant_names
@@ -18,6 +16,7 @@ from experiments.record.phases import STORY
 from experiments.session.familiarise import story_text
 from experiments.trials.trial_config import PATHS, TrialConfig
 from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.support.environment import version_of
 from mjsim.support.files import PACKAGES, digest_of, read_bytes, source_digest
 
 LIBRARIES = ("mujoco", "numpy", "numba", "llvmlite", "ortools", "scipy", "shapely")
@@ -80,8 +79,5 @@ def plugin_digest(module: str) -> str:
 
 @functools.cache
 def _libraries() -> dict[str, str]:
-    found = {"python": platform.python_version(), "machine": platform.machine()}
-    for name in ("mjsim", *LIBRARIES):
-        with contextlib.suppress(PackageNotFoundError):
-            found[name] = version(name)
-    return found
+    installed = {name: found for name in ("mjsim", *LIBRARIES) if (found := version_of(name)) is not None}
+    return {"python": platform.python_version(), "machine": platform.machine(), **installed}

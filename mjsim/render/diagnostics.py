@@ -5,7 +5,6 @@ import platform
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +17,7 @@ from mjsim.support.environment import (
     chosen_gl,
     hidden_package,
     shared_names,
+    version_of,
 )
 from mjsim.values.errors import RenderError
 
@@ -94,7 +94,7 @@ def environment_report() -> EnvironmentReport:
         problem = str(error)
     except Exception as error:
         problem = f"{type(error).__name__}: {' '.join(str(error).split())}"
-    versions = {name: _version(name) for name in MODULES}
+    versions = {name: version_of(name) for name in MODULES}
     installed = [name for name, version in versions.items() if version is not None]
     broken = {name: fault for name in installed if (fault := _import_error(MODULES[name]))}
     vendors = egl_vendors()
@@ -168,10 +168,3 @@ def _import_error(module: str) -> str | None:
     except Exception as error:  # a library built for another NumPy version can raise any type of exception
         return f"{type(error).__name__}: {' '.join(str(error).split())}"
     return None
-
-
-def _version(distribution: str) -> str | None:
-    try:
-        return metadata.version(distribution)
-    except metadata.PackageNotFoundError:
-        return None

@@ -16,6 +16,14 @@ ENABLED = ("enable", "enabled", "on", "true", "1")  # values of MUJOCO_GL with w
 DEFAULT = "egl"
 
 
+def version_of(distribution: str) -> str | None:
+    """Return the version of a distribution, or None if it is not installed."""
+    try:
+        return metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return None
+
+
 def hidden_package(name: str) -> str | None:
     """Return an error message if another package hides this project's package, or None."""
     own = Path(__file__).resolve().parents[2] / name

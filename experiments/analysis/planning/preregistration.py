@@ -11,7 +11,6 @@ import zipfile
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +31,7 @@ from experiments.record.run_directory import TRIALS
 from experiments.trials.design import counted, read_design
 from experiments.trials.exclusions import Exclusions
 from experiments.trials.trial_config import PATHS, SETTINGS
+from mjsim.support.environment import version_of
 from mjsim.support.files import ROOT, read_bytes, replacing, source_digest
 
 STUDY, DESIGN, MEASURES, EXCLUSIONS = "study.toml", "design.json", "measures.toml", "exclusions.json"
@@ -100,20 +100,14 @@ def _frozen(exclusions: Exclusions, measures: bytes) -> Files:
         MEASURES: measures,
         EXCLUSIONS: _json(msgspec.to_builtins(exclusions)),
         VERSIONS: _json(
-            {"python": platform.python_version(), **_versions(), "code of mjsim": source_digest()}
+            {
+                "python": platform.python_version(),
+                **{name: version_of(name) or "not installed" for name in LIBRARIES},
+                "code of mjsim": source_digest(),
+            }
         ),
         **{CODE + file.relative_to(ROOT).as_posix(): file.read_bytes() for file in sources},
     }
-
-
-def _versions() -> dict[str, str]:
-    found = {}
-    for name in LIBRARIES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
 
 
 def _json(value: Any) -> bytes:
