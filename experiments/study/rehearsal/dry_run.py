@@ -81,11 +81,9 @@ async def dry_run(
         around = Surroundings(
             base,
             client,
-            {phase.name: phase for phase in procedure.phases},
+            procedure.plan,
             homes_in(folders),
             link_parameters(study, platform),
-            study.settings.minimum,
-            study.settings.limits.attempts,
             FACTOR,
             hasty=True,
         )

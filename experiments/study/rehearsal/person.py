@@ -1,6 +1,7 @@
 """Simulated participants, who visit the pages of a study over HTTP and play trials over a WebSocket."""
 
 import asyncio
+import functools
 import re
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
@@ -15,8 +16,9 @@ from experiments.record.phases import FLYTHROUGH
 from experiments.study.rehearsal.link import Link, LostError, connected
 from experiments.study.rehearsal.plan import Planned, moment
 from experiments.study.rehearsal.player import SimulatedPlayer
+from experiments.visit.phases import phases_of
 from experiments.visit.phases.base import FormPhase, Phase
-from experiments.visit.plan import COMPREHENSION
+from experiments.visit.plan import COMPREHENSION, VisitPlan
 from experiments.visit.texts.items import Item
 
 SHOWN = re.compile(r'name="phase" value="([^"]+)"|data-trial="(\w+)"')
@@ -63,14 +65,16 @@ class Surroundings:
 
     base: str
     client: httpx.AsyncClient
-    phases: Mapping[str, Phase]
+    plan: VisitPlan
     home: Callable[[str], House]  # loads the house of the participant with a link
     parameters: Mapping[str, str]  # query parameters of the platform's links, with empty ids
-    minimum: Mapping[str, float]  # minimum duration of each phase, in seconds, enforced by the server
-    attempts: int | None  # number of attempts allowed at the comprehension check
     factor: float  # factor by which waiting times are divided
     hasty: bool = False  # True to submit forms too early as well, which the server must refuse
     watch: Watch = _ignore  # called with the name of each page and the server's response
+
+    @functools.cached_property
+    def phases(self) -> dict[str, Phase]:
+        return {phase.name: phase for phase in phases_of(self.plan)}
 
 
 class SimulatedPerson:
@@ -136,7 +140,7 @@ class SimulatedPerson:
         return "stuck"
 
     async def _send_early(self, phase: Phase) -> None:
-        if self._around.minimum.get(phase.name, 0.0) > 0.0:
+        if self._around.plan.minimum.get(phase.name, 0.0) > 0.0:
             await self._post(self.rehearsed.link, form_of(phase, self._rng))
             if not _shows(await self._get(self.rehearsed.link), phase):
                 self._fault(f"{phase.name} ends before its minimum time")
@@ -157,9 +161,9 @@ class SimulatedPerson:
             await self._get(f"{link}/film")
         if isinstance(phase, FormPhase) and phase.items:
             await self._post(f"{link}/answers", form)
-        minimum, careless = self._around.minimum.get(phase.name, 0.0), self._planned.wrong and not tries
-        await asyncio.sleep(minimum)
-        careless &= phase.name != COMPREHENSION or self._around.attempts != 1
+        plan, careless = self._around.plan, self._planned.wrong and not tries
+        await asyncio.sleep(plan.minimum.get(phase.name, 0.0))
+        careless &= phase.name != COMPREHENSION or plan.limits.attempts != 1
         wrong = wrong_form(phase, form)
         if wrong is not None and (leaves == "fails" or careless):
             await self._post(link, wrong)

@@ -14,9 +14,8 @@ import msgspec
 from experiments.errors import ConfigError, RecordError
 from experiments.study.file import Study
 from experiments.study.plan import plan_of
-from experiments.study.recruitment import recruiter
 from experiments.study.rehearsal.person import Rehearsed, SimulatedPerson, Surroundings
-from experiments.study.rehearsal.plan import Planned, link_parameters, plan_people
+from experiments.study.rehearsal.plan import Planned, link_parameters, plan_people, rehearsed
 from experiments.study.rehearsal.player import homes_in
 from experiments.visit.folders import VISITS, VisitFolders
 from experiments.visit.phases import phases_of
@@ -63,10 +62,10 @@ async def rehearse(
     planned = plan_people(
         names, settings.people, settings.seed, per_minute=settings.per_minute, dropouts=settings.dropouts
     )
-    done = [rehearsed for rehearsed in known.values() if rehearsed.outcome not in ("", "stuck")]
-    for rehearsed in done:
-        on_person(rehearsed)
-    left = [one for one in planned if one.number not in {rehearsed.number for rehearsed in done}]
+    done = {one.number: one for one in known.values() if one.outcome not in ("", "stuck")}
+    for one in done.values():
+        on_person(one)
+    left = [person for person in planned if person.number not in done]
     if left:
         async with _server(study, settings, out, film) as base:
             await _send(study, settings, out, base, left, known, on_person)
@@ -138,17 +137,12 @@ async def _send(
     known: dict[int, Rehearsed],
     on_person: Callable[[Rehearsed], None],
 ) -> None:
-    platform = recruiter(study.settings.recruitment)
-    parameters = link_parameters(study, platform)
-    phases = {phase.name: phase for phase in phases_of(plan_of(study))}
-    home = homes_in(VisitFolders(out / SERVED / VISITS))
-    minimum = {name: seconds / settings.factor for name, seconds in study.settings.minimum.items()}
+    plan, home = plan_of(rehearsed(study, settings.factor)), homes_in(VisitFolders(out / SERVED / VISITS))
+    parameters = link_parameters(study, plan.recruiter)
     # Do not keep idle connections, because the client checks every connection before each request.
     limits = httpx.Limits(max_connections=None, max_keepalive_connections=0)
     async with httpx.AsyncClient(base_url=base, timeout=HTTP_TIMEOUT, limits=limits) as client:
-        around = Surroundings(
-            base, client, phases, home, parameters, minimum, study.settings.limits.attempts, settings.factor
-        )
+        around = Surroundings(base, client, plan, home, parameters, settings.factor)
         with (out / PEOPLE).open("ab", buffering=0) as kept:
 
             async def live(planned: Planned, wait: float) -> None:

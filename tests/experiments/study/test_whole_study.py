@@ -92,8 +92,7 @@ async def take_part(path, folder, film_file, people, leaves=()):
         base, http = url_of(listener).rstrip("/"), http_server(server.app("127.0.0.1"))
         serving = asyncio.create_task(http.serve([listener]))
         client = await stack.enter_async_context(httpx.AsyncClient(base_url=base, timeout=PATIENCE))
-        phases = {phase.name: phase for phase in procedure.phases}
-        around = Surroundings(base, client, phases, homes_in(procedure.folders), {}, {}, 3, 1e6)
+        around = Surroundings(base, client, plan, homes_in(procedure.folders), {}, 1e6)
         gone = [Rehearsed(one) if isinstance(one, int) else one for one in people]
         for one in gone:
             how, where = ("vanishes", "task") if one.number in leaves else (None, "")
