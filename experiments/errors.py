@@ -111,6 +111,12 @@ def _is_user_file(file: str) -> bool:
     return not any(Path(file).is_relative_to(ROOT / package) for package in PACKAGES)
 
 
+def listed(names: Sequence[str], most: int = 3) -> str:
+    """Return up to `most` names, separated by commas, and how many more there are."""
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
+
+
 def definition(code: object) -> str:
     """Return the file and line at which a function is defined, or an empty string if unknown."""
     try:

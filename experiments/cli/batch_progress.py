@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import add_call_limit
 from experiments.cli.server import number
-from experiments.errors import ConfigError
+from experiments.errors import ConfigError, listed
 from experiments.trials.design import Design, counted
 from experiments.trials.shards import Shard
 from experiments.trials.workers import EXECUTORS, PROCESSES
@@ -153,10 +153,7 @@ def _merge(design: Design, out: Path, parts: list[Path], workers: int | None) ->
     if not merged.missing:
         return 0
     incomplete = [f"--shard {shard} ({count})" for shard, count in merged.shards.items()]
-    more = f" and {len(incomplete) - MAX_SHARDS_SHOWN} more" if len(incomplete) > MAX_SHARDS_SHOWN else ""
-    shards = (
-        f"{', '.join(incomplete[:MAX_SHARDS_SHOWN])}{more}" if incomplete else "the shards that hold them"
-    )
+    shards = listed(incomplete, MAX_SHARDS_SHOWN) or "the shards that hold them"
     todo = f"run again {shards}, then merge again"
     if others and len(merged.missing) == len(design.trials):
         todo = "give --merge the DESIGN.toml or the options with which the shards were run"

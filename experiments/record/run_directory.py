@@ -7,12 +7,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from experiments.errors import RecordError
+from experiments.errors import RecordError, listed
 from experiments.record import records
 from experiments.record.files import CHECKSUMS, write_checksums
 from mjsim.support.files import exchange, work_folder
 
-SHOWN_NAMES = 3  # maximum number of existing files that are named in an error
 # Maximum number of folders that are inspected in a batch, because network file systems are slow
 SAMPLE = 100
 TRIALS = "trials"  # name of the subfolder of a batch that contains the runs
@@ -72,7 +71,7 @@ def check_run_directory(path: Path, *, replace: bool = False) -> Path:
         raise RecordError(f"{path} holds a batch, which a run never replaces; choose another --out")
     if foreign or not is_run(place):
         raise RecordError(
-            f"{path} holds {_listed(foreign or names)}, which no run wrote; choose another --out or move it away "
+            f"{path} holds {listed(foreign or names)}, which no run wrote; choose another --out or move it away "
             "(--force replaces only a run)"
         )
     if not replace:
@@ -91,7 +90,7 @@ def check_batch_folder(path: Path) -> None:
     if place.exists() and not place.is_dir():
         raise RecordError(f"{path} is a file; name a folder for --out")
     if place.exists() and any(place.iterdir()) and not is_batch(place):
-        what = "a run" if is_run(place) else _listed(sorted(entry.name for entry in place.iterdir()))
+        what = "a run" if is_run(place) else listed(sorted(entry.name for entry in place.iterdir()))
         raise RecordError(
             f"{path} holds {what} and is not the folder of a batch; choose another --out or move it away"
         )
@@ -216,9 +215,3 @@ def _check_writable(folder: Path) -> None:
             pass
     except OSError as error:
         raise OSError(error.errno, f"cannot be written to ({error.strerror})", str(folder)) from error
-
-
-def _listed(names: list[str]) -> str:
-    more = len(names) - SHOWN_NAMES
-    shown = ", ".join(names[:SHOWN_NAMES])
-    return f"{shown} and {more} more" if more > 0 else shown

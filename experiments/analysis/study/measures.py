@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.errors import ConfigError, RecordError, shown
+from experiments.errors import ConfigError, RecordError, listed, shown
 from experiments.record.files import read_json
 from experiments.record.metrics import CIRCUMSTANCES, Displays, Metrics
 from experiments.trials.designs import FOLDER
@@ -118,10 +118,9 @@ def unread_note(columns: Sequence[str], measures: Measures) -> list[str]:
     known = {*read, *SETTINGS, *CIRCUMSTANCES, *recorded}
     answers = {LIKERT_PREFIX + name for name in measures.likert}
     unread = [shown(c) for c in columns if c not in known | answers and not _OF_A_TRIAL.fullmatch(c)]
-    more = f" and {len(unread) - MAX_COLUMNS_SHOWN} more" if len(unread) > MAX_COLUMNS_SHOWN else ""
     if not unread:
         return []
-    return [f"These columns of the table are not analysed: {', '.join(unread[:MAX_COLUMNS_SHOWN])}{more}."]
+    return [f"These columns of the table are not analysed: {listed(unread, MAX_COLUMNS_SHOWN)}."]
 
 
 def resolve(measure: Measure, known: Collection[str]) -> str | None:

@@ -19,7 +19,7 @@ from experiments.analysis.study.measures import (
     resolve,
     unread_note,
 )
-from experiments.errors import RecordError
+from experiments.errors import RecordError, listed
 from experiments.record.files import read_json
 from experiments.record.phases import ALL_DELIVERED, RECORDED, REHEARSED, TASK, origin_of
 from experiments.record.run_directory import VISIT, is_run, visit_folders
@@ -118,10 +118,9 @@ class StudyTable:
     def absent(self) -> list[str]:
         """Return a list with one note that names all excluded participants, or an empty list."""
         names = [person.person for person in self.left_out]
-        more = f" and {len(names) - MAX_PEOPLE_SHOWN} more" if len(names) > MAX_PEOPLE_SHOWN else ""
         if not names:
             return []
-        return [f"left out, as not everything was delivered: {', '.join(names[:MAX_PEOPLE_SHOWN])}{more}"]
+        return [f"left out, as not everything was delivered: {listed(names, MAX_PEOPLE_SHOWN)}"]
 
     def sizes(self) -> dict[tuple[str, int], int]:
         """Return the number of participants for each combination of condition and number of objects."""
