@@ -2,9 +2,8 @@
 
 from matplotlib.figure import Figure
 
-from experiments.analysis.comparison_plot import mark_origin
 from experiments.analysis.page import FigureBlock
-from experiments.analysis.report.figures import svg
+from experiments.analysis.report.figures import framed
 from studies.published import Published
 from studies.score import EFFECT_SIZE, Score
 
@@ -45,5 +44,4 @@ def forest(score: Score, published: Published) -> FigureBlock:
     axes.set_xlabel("partial η²", fontsize=9)
     axes.set_xlim(left=0)
     axes.spines[["top", "right"]].set_visible(False)
-    mark_origin(figure, score.origin)
-    return svg(figure, f"Published effect sizes and ours. {score.origin}.", FOREST)
+    return framed(figure, "Published effect sizes and ours", score.origin, FOREST)

@@ -11,9 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from experiments.analysis.comparison_plot import mark_origin
 from experiments.analysis.page import Block, FigureBlock, Paragraph, page, table
-from experiments.analysis.report.figures import svg
+from experiments.analysis.report.figures import framed
 from experiments.analysis.study.robustness import left_out_table
 from experiments.record.files import write_json
 from mjsim.support.files import write_text_atomically
@@ -182,8 +181,7 @@ def prior_and_kept(found: Calibration) -> FigureBlock:
         panels[k].axvline(fit.draws[fit.best, k], color="#D55E00", lw=1.2, label="best")
         panels[k].set_title(name, fontsize=8)
     panels[0].legend(fontsize=6, frameon=False)
-    mark_origin(figure, found.origin)
-    return svg(figure, f"Free parameters before and after. {found.origin}.", PRIOR_AND_KEPT)
+    return framed(figure, "Free parameters before and after", found.origin, PRIOR_AND_KEPT)
 
 
 def _kept_csv(found: Calibration) -> str:

@@ -75,7 +75,7 @@ def specification_curve(analysis: Analysis, name: str, label: str) -> FigureBloc
         "Estimates with 90 % confidence intervals; filled where p < .05. Effect sizes of Welch and HC3 count the "
         "variance of each group in units of its own, those of Fisher, Type II and Type III the variance of all."
     )
-    return framed(figure, f"Specification curve of {label.lower()}", analysis.table, caption)
+    return framed(figure, f"Specification curve of {label.lower()}", analysis.table.origin, caption)
 
 
 def _specifications(analysis: Analysis, name: str) -> dict[str, list[Specification]]:
@@ -140,7 +140,7 @@ def _residuals(analysis: Analysis, labels: Mapping[str, str]) -> FigureBlock:
         "Above: residuals by the mean of their cell; they should spread equally. Below: residuals in order against the "
         "quantiles of a normal distribution; they should lie on the line."
     )
-    return framed(figure, "Residuals", analysis.table, caption)
+    return framed(figure, "Residuals", analysis.table.origin, caption)
 
 
 def assumptions(analysis: Analysis, labels: Mapping[str, str]) -> Iterator[Block]:

@@ -58,7 +58,7 @@ def by_condition(table: StudyTable, labels: Mapping[str, str]) -> FigureBlock:
     for axes, objects in zip(figure.axes, levels, strict=False):
         axes.set_title(counted(objects, "object"), fontsize=9)
     caption = "Each dot is a person; black: means with 95 % confidence intervals (Student's t)."
-    return framed(figure, "Measures by condition and number of objects", table, caption)
+    return framed(figure, "Measures by condition and number of objects", table.origin, caption)
 
 
 def _draw_people(axes: Axes, table: StudyTable, name: str, objects: int) -> None:
@@ -89,7 +89,7 @@ def interactions(table: StudyTable, labels: Mapping[str, str]) -> FigureBlock:
         "Means by number of objects with 95 % confidence intervals, side by side. Each measure has the axis "
         "of the figure above."
     )
-    return framed(figure, "Means by number of objects and condition", table, caption)
+    return framed(figure, "Means by number of objects and condition", table.origin, caption)
 
 
 def variances(table: StudyTable, name: str, label: str) -> FigureBlock:
@@ -110,7 +110,7 @@ def variances(table: StudyTable, name: str, label: str) -> FigureBlock:
         axes.set_title(counted(objects, "object"), fontsize=8)
     figure.supxlabel(label, fontsize=9)
     caption = "Number of people by value, in each cell."
-    return framed(figure, f"Distribution of {label.lower()}", table, caption)
+    return framed(figure, f"Distribution of {label.lower()}", table.origin, caption)
 
 
 def answers(analysis: Analysis) -> FigureBlock:
@@ -134,11 +134,12 @@ def answers(analysis: Analysis) -> FigureBlock:
     figure.supxlabel("share of people", fontsize=9)
     shares = f"Shares of the answers from 1 (brown, disagree) to {points} (violet, agree)"
     caption = f"{shares}, all numbers of objects together."
-    return framed(figure, "Answers by condition", table, caption)
+    return framed(figure, "Answers by condition", table.origin, caption)
 
 
-def svg(figure: Figure, title: str, caption: str) -> FigureBlock:
-    """Convert a figure to inline SVG."""
+def framed(figure: Figure, title: str, origin: str, caption: str) -> FigureBlock:
+    """Label a figure with the origin of its data, and convert it to inline SVG."""
+    mark_origin(figure, origin)
     FigureCanvasSVG(figure)
     text = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": "mjsim", "svg.fonttype": "path"}):
@@ -146,15 +147,9 @@ def svg(figure: Figure, title: str, caption: str) -> FigureBlock:
     found = re.sub(r"<metadata>.*?</metadata>", "", text.getvalue(), flags=re.DOTALL)
     found = found[found.index("<svg") :]
     found = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", found)
-    found = found.replace("<svg", f'<svg role="img" aria-label="{title}"', 1)
+    found = found.replace("<svg", f'<svg role="img" aria-label="{title}. {origin}."', 1)
     drawing = Markup(found)  # nosec B704  # titles and drawings of this package
     return FigureBlock(drawing, caption)
-
-
-def framed(figure: Figure, title: str, table: StudyTable, caption: str) -> FigureBlock:
-    """Label a figure with the origin of its data, and convert it to inline SVG."""
-    mark_origin(figure, table.origin)
-    return svg(figure, f"{title}. {table.origin}.", caption)
 
 
 def grid(figure: Figure, rows: int, columns: int) -> NDArray[Any]:
@@ -210,13 +205,12 @@ def paths_figure(table: StudyTable, folder: Path) -> FigureBlock:
         with opened_run(run) as opened:
             _draw_run(axes, row, opened)
     figure.axes[0].legend(fontsize=7, loc="lower left")
-    mark_origin(figure, table.origin)
     caption = (
         f"The person with the median distance in each condition, with {counted(table.levels()[0], 'object')}: the "
         "route that was planned at the start, and the one that was walked, in the house seen from above; metres walked "
         "in the titles."
     )
-    return svg(figure, f"Planned and walked paths. {table.origin}.", caption)
+    return framed(figure, "Planned and walked paths", table.origin, caption)
 
 
 def median_people(table: StudyTable) -> Iterator[Any]:
