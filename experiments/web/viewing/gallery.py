@@ -50,12 +50,10 @@ def write_gallery(
         on_home: Called after each home with None, or with an error message if drawing failed.
 
     Raises:
-        ConfigError: `workers` is below 1, or `out` contains other files.
+        ConfigError: `out` contains other files.
         RenderError: This machine cannot render.
         OSError: A file cannot be written.
     """
-    if workers < 1:
-        raise ConfigError(f"a gallery needs at least one worker, got {workers}")
     if out.exists() and not (out / HOMES).is_dir() and (not out.is_dir() or any(out.iterdir())):
         raise ConfigError(f"{out} exists and is no gallery; name a new folder")
     (out / HOMES).mkdir(parents=True, exist_ok=True)
