@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import time
-from collections.abc import AsyncIterator, Callable, Coroutine, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -104,12 +104,12 @@ class VisitServer:
                 embedded_by=self._plan.recruiter.embedded_by,
             ),
             exception_handlers={
-                404: self._unknown,
-                _ElsewhereError: self._elsewhere,
+                404: self._says("unknown", 404),
+                _ElsewhereError: self._says("paused", 404),  # the status makes a proxy try the next host
                 StoreError: self._out_of_order,
                 RecordError: self._out_of_order,
                 OSError: self._out_of_order,
-                Exception: self._failed,
+                Exception: self._says("paused", 500),
             },
             lifespan=self._lifespan,
         )
@@ -236,15 +236,11 @@ class VisitServer:
         LOG.error("%s", error)
         return self._pages.message(request, "paused", 503)
 
-    async def _failed(self, request: Request, _: Exception) -> Response:
-        return self._pages.message(request, "paused", 500)
+    def _says(self, name: str, status: int) -> Callable[[Request, Exception], Awaitable[Response]]:
+        async def answer(request: Request, _: Exception) -> Response:
+            return self._pages.message(request, name, status)
 
-    async def _unknown(self, request: Request, _: Exception) -> Response:
-        return self._pages.message(request, "unknown", 404)
-
-    async def _elsewhere(self, request: Request, _: Exception) -> Response:
-        """Return a page with status 404, which makes a proxy try the next host."""
-        return self._pages.message(request, "paused", 404)
+        return answer
 
     async def _person(self, request: Request) -> PersonRow:
         token = request.path_params["token"]
