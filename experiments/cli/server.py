@@ -12,7 +12,7 @@ import threading
 import traceback
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
@@ -157,13 +157,14 @@ def _networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-def number(smallest: int, largest: int) -> Callable[[str], int]:
-    """Return a function that parses an integer between the given limits."""
+def number(smallest: float, largest: float, kind: type[float] = int) -> Callable[[str], float]:
+    """Return a function that parses a number between the given limits, which is an integer by default."""
 
-    def parse(text: str) -> int:
-        if not text.isdecimal() or not smallest <= int(text) <= largest:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a number from {smallest} to {largest}")
-        return int(text)
+    def parse(text: str) -> float:
+        with suppress(ValueError):
+            if smallest <= (value := kind(text)) <= largest:
+                return value
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number from {smallest} to {largest}")
 
     return parse
 

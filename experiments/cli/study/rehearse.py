@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from experiments.study.rehearsal.run import RehearsalSettings
 
 MAX_FAULTS_SHOWN = 20
+POSITIVE = 0.001, 1_000_000  # limits of a number above 0
 DESCRIPTION = """\
 Rehearse a whole study with simulated participants. They use the real server (OUT/served), with pages by HTTP and trials
 by WebSocket. They arrive and answer at random, leave, return, reload, lose the connection, and submit forms twice.
@@ -44,19 +45,19 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--seed", type=number(0, 2**53), default=0, help="seed of the participants")
     parser.add_argument(
         "--per-minute",
-        type=_positive,
+        type=number(*POSITIVE, float),
         default=2.0,
         metavar="N",
         help="arrivals per minute",
     )
     parser.add_argument(
         "--dropouts",
-        type=_share,
+        type=number(0, 1, float),
         default=0.2,
         metavar="SHARE",
         help="share of participants who leave",
     )
-    parser.add_argument("--factor", type=_positive, default=20.0, help="speed-up of waiting")
+    parser.add_argument("--factor", type=number(*POSITIVE, float), default=20.0, help="speed-up of waiting")
     parser.add_argument(
         "--film", type=Path, metavar="FILE.mp4", help="film of the house (default: one is made)"
     )
@@ -109,17 +110,3 @@ async def _run(
         return await report(study, settings, store, people, arguments.out)
     finally:
         await store.close()
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < 1e6:
-        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
-    return value
-
-
-def _share(text: str) -> float:
-    value = float(text)
-    if not 0.0 <= value <= 1.0:
-        raise argparse.ArgumentTypeError(f"{text} is not a number from 0 to 1")
-    return value
