@@ -80,19 +80,16 @@ class _Camera:
 
     def turn(self, heading: float, pitch: float = 0.0) -> None:
         change = (heading - self.heading + math.pi) % (2.0 * math.pi) - math.pi
-        self._turn_by(change, pitch)
+        self.turn_by(change, pitch)
 
-    def look_around(self) -> None:
-        self._turn_by(2.0 * math.pi, 0.0)
-
-    def look_at(self, house: House, key: str) -> None:
-        offset = house.receptacles[key].center - np.array([*self.place, EYE_HEIGHT])
+    def look_at(self, key: str) -> None:
+        offset = self._house.receptacles[key].center - np.array([*self.place, EYE_HEIGHT])
         pitch = math.atan2(offset[2], math.hypot(offset[0], offset[1]))
         self.turn(math.atan2(offset[1], offset[0]), pitch)
         rest = np.array([*self.place, self.heading, self.pitch])
         self._add(np.tile(rest, (round(BIN_TIME / STEP), 1)), key)
 
-    def _turn_by(self, change: float, pitch: float) -> None:
+    def turn_by(self, change: float, pitch: float) -> None:
         count = max(1, math.ceil(max(abs(change), abs(pitch - self.pitch)) / (TURNING * STEP)))
         share = np.arange(1, count + 1) / count
         rows = np.empty((count, 4))
@@ -117,7 +114,12 @@ def camera_path(house: House) -> CameraPath:
     room = next(iter(stops))
     camera = _Camera(house, stops[room][0].place)
     while True:
-        _visit(camera, house, stops.pop(room))
+        for stop in _nearest_first(house, stops.pop(room)):
+            camera.move(stop.place)
+            if stop.bin is None:
+                camera.turn_by(2.0 * math.pi, 0.0)
+            else:
+                camera.look_at(stop.bin)
         if not stops:
             break
         room = min(stops, key=lambda key: estimated_distance(house, camera.place, stops[key][0].place))
@@ -168,15 +170,6 @@ def _bin_place(house: House, start: Point, key: str) -> Point:
         if visible_receptacles(compiled.model, compiled.data, {key: bin_}, eye, heading, pitch, field=_FIELD):
             break
     return np.asarray(place)
-
-
-def _visit(camera: _Camera, house: House, stops: Sequence[_Stop]) -> None:
-    for stop in _nearest_first(house, stops):
-        camera.move(stop.place)
-        if stop.bin is None:
-            camera.look_around()
-        else:
-            camera.look_at(house, stop.bin)
 
 
 def _nearest_first(house: House, stops: Sequence[_Stop]) -> Iterator[_Stop]:
