@@ -3,6 +3,7 @@
 import argparse
 import itertools
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -112,22 +113,19 @@ async def _walk(
     from experiments.study.rehearsal.dry_run import dry_run
     from experiments.study.rehearsal.pictures import BROWSERS, browser, camera, write_contact_sheet
 
-    async def note(name: str, _url: str, _content: str) -> None:
-        on_page(name)
-
-    if out is None:
-        return await dry_run(study, recruiter, folder, pool, note)
-    if (program := browser()) is None:
+    program = None if out is None else browser()
+    if out is not None and program is None:
         print(f"pictures  none, as no Chromium is installed ({', '.join(BROWSERS)})")
-        return await dry_run(study, recruiter, folder, pool, note)
-    async with camera(program, out) as taking:
+    async with camera(program, out) if out and program else nullcontext() as taking:
 
         async def photograph(name: str, url: str, content: str) -> None:
             on_page(name)
-            await taking.photograph(name, url, content)
+            if taking is not None:
+                await taking.photograph(name, url, content)
 
         walked = await dry_run(study, recruiter, folder, pool, photograph)
-    print(f"pictures  {write_contact_sheet(out, taking.taken, study.settings.title)}")
+    if out is not None and taking is not None:
+        print(f"pictures  {write_contact_sheet(out, taking.taken, study.settings.title)}")
     return walked
 
 
