@@ -30,11 +30,10 @@ def write_report(
     """
     path, people = people_path(folder), read_people(folder)
     analysis = analyse(study_table(people, measures, path, exclusions), measures)
-    rules = leave_one_out(people, measures, path, exclusions)
-    selection = Selection(rules)
+    selection = Selection(leave_one_out(people, measures, path, exclusions))
     if frozen is not None:
         departing = departures(frozen, exclusions, people, folder, measures)
-        selection = Selection(rules, frozen.sha256, departing)
+        selection = Selection(selection.rules, frozen.sha256, departing)
     note_derived(folder, "analysis", out)
     write_analysis(out, analysis, report(analysis, folder, selection), selection.as_json())
     return analysis, selection
