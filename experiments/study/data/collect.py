@@ -29,6 +29,7 @@ from experiments.visit.texts.items import Item
 from mjsim.support.files import write_text_atomically
 
 TEXTS = "texts.csv"
+PROCESSES = os.cpu_count() or 1  # number of processes that read runs
 FREE = ("line", "text")  # types of survey items with free-text answers
 # Control characters and marks of the writing direction, which make a text look different from what it is
 INVISIBLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
@@ -72,7 +73,7 @@ async def collect(study: Study, store: Store, folder: Path) -> Collected:
     finished = [person for person in people if person.id in trials]
     unfinished: Counter[str] = Counter(person.status for person in people if person.id not in trials)
     paths = [folder / trials[person.id].folder for person in finished]
-    for person, run in zip(finished, read_runs(paths, _processes()), strict=True):
+    for person, run in zip(finished, read_runs(paths, PROCESSES), strict=True):
         trial = trials[person.id]
         if isinstance(run, str):
             unusable[person_name(person)] = run
@@ -81,10 +82,6 @@ async def collect(study: Study, store: Store, folder: Path) -> Collected:
         row = {**about, **run.row, **_answers(items, answers_of.get(person.id, ()))}
         rows.append({key: harmless(value) if isinstance(value, str) else value for key, value in row.items()})
     return Collected(_complete(rows), _texts(items, people, answers), unfinished, unusable, survey_of(study))
-
-
-def _processes() -> int:
-    return os.cpu_count() or 1
 
 
 def survey_of(study: Study) -> SurveyScale:
@@ -118,7 +115,7 @@ def collect_visits(folder: Path) -> Collected:
     visits = list(visit_folders(folder))
     tasks = [visit / TASK for visit in visits if is_run(visit / TASK)]
     under_way = len(visits) - len(tasks)
-    for path, run in zip(tasks, read_runs(tasks, _processes()), strict=True):
+    for path, run in zip(tasks, read_runs(tasks, PROCESSES), strict=True):
         name = visit_name(path.parent.name)
         if isinstance(run, str):
             unusable[name] = run
