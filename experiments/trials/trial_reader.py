@@ -7,7 +7,7 @@ changed. The cache may be deleted at any time.
 
 import gzip
 import zlib
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from pathlib import Path
@@ -114,10 +114,6 @@ def read_runs(paths: Sequence[Path], workers: int) -> Iterator[StoredTrial | str
                 yield result
     for path in left:  # all trials, or those that the worker processes did not read
         yield _read(path)
-
-
-def read_trials(out: Path) -> tuple[list[StoredTrial], Mapping[Path, str]]:
-    return TrialReader(out).read()
 
 
 def _rows_file(label: str) -> str:

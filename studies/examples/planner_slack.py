@@ -36,7 +36,7 @@ from experiments.record.run_directory import TRIALS
 from experiments.trials.batch import BatchProgress, run_batch
 from experiments.trials.design import Design
 from experiments.trials.designs import read_study, study_path
-from experiments.trials.trial_reader import read_trials
+from experiments.trials.trial_reader import TrialReader
 from mjsim.support.files import replacing, write_text_atomically
 from planner.ortools_solver import OrToolsSolver
 from planner.plan import Plan
@@ -121,7 +121,7 @@ def design(people: int, objects: Sequence[int], first_seed: int = FIRST_SEED) ->
 def slacks(folder: Path) -> list[Slack]:
     """Summarize the trials in a folder by condition, number of objects and planner."""
     cells: dict[tuple[str, int, str], list[Sequence[Event]]] = {}
-    for trial in read_trials(folder)[0]:
+    for trial in TrialReader(folder).read()[0]:
         settings = trial.settings
         key = settings["assistance"], settings["objects"], settings["planner"]
         cells.setdefault(key, []).append(read_events(trial.path / records.EVENTS))
@@ -154,7 +154,7 @@ def _slack(assistance: str, objects: int, planner: str, logs: Sequence[Sequence[
 def walked_differently(folder: Path) -> Iterator[str]:
     """Yield trials without suggestions whose path depends on the planner. No such trial should exist."""
     paths: dict[tuple[int, int], Any] = {}
-    for trial in read_trials(folder)[0]:
+    for trial in TrialReader(folder).read()[0]:
         if trial.settings["assistance"] == "none":
             key = trial.settings["objects"], trial.settings["person_seed"]
             walked = read_arrays(trial.path / records.TRAJECTORY, only=["position"])["position"]

@@ -18,7 +18,7 @@ from experiments.trials.design import Design, confounded, factorial
 from experiments.trials.fingerprint import plugin_digest, trial_inputs
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from experiments.trials.trial_reader import read_trials
+from experiments.trials.trial_reader import TrialReader
 from hud.errors import ConditionError
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.scene import sampling
@@ -55,7 +55,7 @@ def test_what_is_there_is_not_run_again(house, tmp_path):
     assert run_missing(trials, tmp_path, house) == (2, ())
     assert run_missing(trials, tmp_path, house) == (0, ())
     assert run_missing([*trials, brief(user="searcher")], tmp_path, house) == (1, ())
-    assert {t.settings["user"] for t in read_trials(tmp_path)[0]} == {"follower", "searcher"}
+    assert {t.settings["user"] for t in TrialReader(tmp_path).read()[0]} == {"follower", "searcher"}
 
 
 def test_an_edited_participant_is_run_again_and_the_old_trial_is_kept(house, tmp_path, monkeypatch):
@@ -70,7 +70,7 @@ def test_an_edited_participant_is_run_again_and_the_old_trial_is_kept(house, tmp
     assert [read_trial(path).settings["user"] for path in (tmp_path / "b/outdated").iterdir()] == [
         "own_person:build"
     ]
-    assert len(read_trials(tmp_path / "b")[0]) == 2
+    assert len(TrialReader(tmp_path / "b").read()[0]) == 2
 
 
 def copy_of(small_house, folder, **replaced):
@@ -91,7 +91,7 @@ def test_houses_whose_folders_share_a_name_are_not_mistaken(small_house, tmp_pat
     assert run_missing(trials[:1], tmp_path / "b") == (1, ())
     assert run_missing(trials[1:], tmp_path / "b") == (1, ())
     assert run_missing(trials, tmp_path / "b") == (0, ())
-    assert {t.settings["house"] for t in read_trials(tmp_path / "b")[0]} == {one, other}
+    assert {t.settings["house"] for t in TrialReader(tmp_path / "b").read()[0]} == {one, other}
 
 
 def test_a_moved_house_is_the_same_and_an_edited_one_is_not(small_house, tmp_path):

@@ -18,7 +18,7 @@ from experiments.trials.batch_plan import check_trials, plan_batch
 from experiments.trials.design import Design
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from experiments.trials.trial_reader import read_trials
+from experiments.trials.trial_reader import TrialReader
 
 SAME = {"objects": 1, "fidelity": "event", "regret": False, "time_limit": 0.2}
 ONE, TWO = (TrialConfig(**SAME, assistance=name, seed=0) for name in ("none", "optimal"))
@@ -49,7 +49,7 @@ def content(folder):
 
 
 def rows(out):
-    return [trial.row for trial in read_trials(out)[0]]
+    return [trial.row for trial in TrialReader(out).read()[0]]
 
 
 def plan(out, *trials):
@@ -91,7 +91,7 @@ def test_a_packed_trial_that_ended_early_is_kept_until_it_is_run_again(packed, o
     batch._archive(path.parent, "test").close()
     batch._archive.cache_clear()
     adopt(packed / TRIALS)
-    (early,) = (trial for trial in read_trials(packed)[0] if not trial.complete)
+    (early,) = (trial for trial in TrialReader(packed).read()[0] if not trial.complete)
     assert early.path == path and not path.exists()
     found = plan(packed, config)
     assert list(found.missing) == [path] and "ended early" in found.notes[0]

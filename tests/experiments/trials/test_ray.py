@@ -18,7 +18,7 @@ from experiments.record.run_directory import TRIALS
 from experiments.trials import batch, fingerprint, ray_workers
 from experiments.trials.batch import RAY, run_batch
 from experiments.trials.design import factorial
-from experiments.trials.trial_reader import read_trials
+from experiments.trials.trial_reader import TrialReader
 from mjsim.support.files import ROOT
 
 ONE = {"objects": [2], "assistance": ["optimal"], "fidelity": "event", "regret": False}
@@ -61,7 +61,7 @@ def test_a_node_that_is_killed_loses_nobody_and_changes_nothing(cluster, tmp_pat
             cluster.remove_node(node, allow_graceful=False)
 
     rows = run_batch(DESIGN, tmp_path / "ray", executor=RAY, on_progress=kill, on_note=notes.append)
-    assert len(rows) == len(read_trials(tmp_path / "ray")[0]) == len(DESIGN.trials)
+    assert len(rows) == len(TrialReader(tmp_path / "ray").read()[0]) == len(DESIGN.trials)
     assert [row["person_seed"] for row in rows] == list(range(4))
     assert (seen[-1].done, seen[-1].failed) == (4, 0)
     assert notes[0].startswith("Ray: 3 cores on 3 machines")
