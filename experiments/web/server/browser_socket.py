@@ -66,7 +66,8 @@ class BrowserSocket:
             leave(self)
             for task in tasks:
                 task.cancel()
-                with suppress(asyncio.CancelledError, WebSocketDisconnect, OSError):
+                # A socket that is already closed raises a RuntimeError.
+                with suppress(asyncio.CancelledError, WebSocketDisconnect, OSError, RuntimeError):
                     await task
 
     async def _send_all(self) -> None:
