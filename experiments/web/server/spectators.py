@@ -29,7 +29,7 @@ class Spectators:
     def __init__(self) -> None:
         self._all: set[Browser] = set()
         self._last: dict[type[WireMessage], WireMessage] = {}
-        self._snapshot: Snapshot | None = None  # with all objects that the page knows
+        self._snapshot: Snapshot | None = None  # last snapshot, extended to all objects that the page knows
 
     def join(self, spectator: Browser) -> None:
         """Add a spectator and send the current state."""
