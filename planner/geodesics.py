@@ -94,7 +94,7 @@ class Geodesics:
     def _locate(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         array = np.array(points, dtype=np.float64).reshape(-1, 2)
         islands = np.maximum(self.navmesh.islands_at(array), 0).astype(np.int64)
-        # Also snap points that are only within the tolerance, because they may be inside an obstacle.
+        # A point that is on an island only within the tolerance may be inside an obstacle, so it is snapped.
         island = np.array(self.navmesh.islands)[islands]
         inside = shapely.intersects_xy(island, array[:, 0], array[:, 1])
         for k in np.flatnonzero(~inside).tolist():

@@ -1,4 +1,4 @@
-"""A planner for sessions, which runs in the caller's thread, or in background threads for live sessions."""
+"""A planner for sessions. It runs in the caller's thread, and in live sessions also in background threads."""
 
 import contextlib
 import functools

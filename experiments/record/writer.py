@@ -106,7 +106,7 @@ class RecordWriter:
             for name in ("hands", "object_status"):
                 columns[name][rest] = columns[name][first]
         self.time = float(columns["time"][end - 1])
-        # set last so that an interruption leaves only complete rows
+        # These are set last, so that an interruption leaves only complete rows.
         self._length, self.step = end, self.step + len(steps)
 
     @property

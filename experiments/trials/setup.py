@@ -91,7 +91,7 @@ def regret_evaluator(config: TrialConfig, house: House) -> RegretEvaluator:
     return RegretEvaluator(house.geodesics, capacity=config.capacity)
 
 
-def prepared_planner(config: TrialConfig, house: House, episode: Episode) -> Planner:
+def trial_planner(config: TrialConfig, house: House, episode: Episode) -> Planner:
     """Create a planner for a trial. The caller must close the planner.
 
     A live planner prepares the first plan before the clock of the trial starts.
@@ -103,7 +103,7 @@ def prepared_planner(config: TrialConfig, house: House, episode: Episode) -> Pla
 
 
 def first_state(house: House, episode: Episode) -> TaskState:
-    """Return the state in which the task of an episode begins."""
+    """Return the initial task state of an episode."""
     return TaskState(
         position=(episode.start.x, episode.start.y),
         loose={placed.name: placed.position[:2] for placed in episode.objects},

@@ -25,9 +25,9 @@ from experiments.trials.floor_plan import draw_topdown
 from experiments.trials.setup import (
     draw_person,
     prepare_session,
-    prepared_planner,
     simulated_user,
     trial_episode,
+    trial_planner,
 )
 from experiments.trials.training import training_config
 from experiments.trials.trial_config import TrialConfig
@@ -81,7 +81,7 @@ def run_trial(
             person = draw_person(config)
             house = (house or House.load(config.house)).for_person(person)
             episode = trial_episode(config, house)
-            planner = prepared_planner(config, house, episode)
+            planner = trial_planner(config, house, episode)
             scene = compose(episode, house.catalogue, person=person, visuals=film is not None)
 
             def progress(now: Progress) -> None:
@@ -156,7 +156,7 @@ def _run_session(
     planner: Planner | None = None,
 ) -> _SessionResult:
     error, log = None, EventLog()
-    planner = planner or prepared_planner(config, house, scene.episode)
+    planner = planner or trial_planner(config, house, scene.episode)
     known_house = house if known.seen is None else dataclasses.replace(house, seen=known.seen)
     with closing(planner), closing(film) if film else nullcontext():
         user = simulated_user(config, known_house)

@@ -16,7 +16,7 @@ from experiments.record import records
 from experiments.record.records import EventLog
 from experiments.trials import setup
 from experiments.trials.replay.replayer import LogSource
-from experiments.trials.setup import prepare_session, prepared_planner
+from experiments.trials.setup import prepare_session, trial_planner
 from experiments.trials.training import trials_of
 from experiments.trials.trial_config import TrialConfig
 from mjsim.house.scene.scene import compose
@@ -188,7 +188,7 @@ def test_a_session_continues_while_every_proof_is_stuck(house, monkeypatch):
     scene = compose(house.sample_episode(objects=6, seed=3), house.catalogue)
     planner.go.set()  # let the plan of the familiarisation finish
     monkeypatch.setattr(setup, "planner_named", lambda _: planner)
-    with contextlib.closing(prepared_planner(config, house, scene.episode)) as guide:
+    with contextlib.closing(trial_planner(config, house, scene.episode)) as guide:
         session, _ = prepare_session(config, house, scene, log, planner=guide)
         planner.go.clear()
         assert session.run() == "all delivered"

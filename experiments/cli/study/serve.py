@@ -63,7 +63,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--film", type=Path, metavar="FILE.mp4", help="film of the house (default: one is made)"
     )
-    # hidden option that only `mjsim study rehearse` uses
+    # `mjsim study rehearse` starts the server with this option, which `--help` does not list.
     parser.add_argument("--rehearsal", type=float, metavar="FACTOR", help=argparse.SUPPRESS)
     server = parser.add_argument_group("server")
     add_server_options(server)

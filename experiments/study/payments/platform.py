@@ -69,7 +69,7 @@ class Order:
 
 
 class Payer:
-    """A client that makes payments through the API of a platform. It raises DeclinedError or UnsureError.
+    """A client for payments through a recruitment platform's API. Its requests raise DeclinedError or UnsureError.
 
     Attributes:
         listed_after: Time until the platform's lists reliably show the outcome of a request.

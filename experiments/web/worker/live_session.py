@@ -25,10 +25,10 @@ from experiments.trials.replay.replayer import LogSource
 from experiments.trials.setup import (
     draw_person,
     prepare_session,
-    prepared_planner,
     regret_evaluator,
     solver_source,
     trial_episode,
+    trial_planner,
 )
 from experiments.trials.trial import draw_floor_plan
 from experiments.trials.trial_config import TrialConfig
@@ -131,7 +131,7 @@ class LiveSession:
         self.world = World(self.scene, options, walls=self.house.navmesh.outline)
         self._human = BrowserParticipant(self.world)
         if record is None:
-            self._planner = prepared_planner(config, self.house, self.scene.episode)
+            self._planner = trial_planner(config, self.house, self.scene.episode)
         else:
             logged = LogSource(record.plans, lambda: self.session.time)
             evaluator = regret_evaluator(config, self.house)

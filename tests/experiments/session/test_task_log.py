@@ -13,7 +13,7 @@ from experiments.cli.main import main
 from experiments.record.records import EVENTS, METRICS, EventLog, read_events
 from experiments.session.task_log import TaskLog, reach_bound
 from experiments.trials import setup
-from experiments.trials.setup import prepare_session, prepared_planner, regret_evaluator, solver_source
+from experiments.trials.setup import prepare_session, regret_evaluator, solver_source, trial_planner
 from experiments.trials.trial_config import TrialConfig
 from mjsim.house.scene.scene import compose
 from planner.exact.solver import ExactSolver
@@ -30,7 +30,7 @@ def test_a_run_is_the_same_whether_plans_are_made_in_a_thread_or_inline(house, a
     scene = compose(house.sample_episode(objects=5, seed=2), house.catalogue)
     runs = []
     for planner in (
-        prepared_planner(config, house, scene.episode),
+        trial_planner(config, house, scene.episode),
         Planner(solver_source(config, house), regret_evaluator(config, house)),
     ):
         log = EventLog()
