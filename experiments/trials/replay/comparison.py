@@ -211,7 +211,7 @@ def _checked(record: Record, name: str, first: int) -> str:
         case records.RECORDING:
             return f"{record.steps} states and {len(record.checkpoint_steps)} checkpoints{start}"
         case records.PLAN:
-            return f"the {len(record.plans)} plans of the log"
+            return "the plans of the log"
         case records.METRICS:
             return "every number computed again; renderer, wall time and hash of the frames by SHA-256"
     return f"unchanged, by its SHA-256 in {CHECKSUMS}"
