@@ -505,6 +505,34 @@ def test_an_object_near_the_way_is_picked_up_by_those_who_are_tempted(
         assert nearer.then == Pick("cup"), "each object is considered once on the way"
 
 
+@pytest.mark.parametrize("tempted", [0.1, 0.3])
+def test_an_object_that_was_passed_is_not_considered_again_on_the_same_way(house, tempted):
+    """The decision at the first sight of the object is the decision at each later sight."""
+    here, cup = place_in(house, "living_room"), place_in(house, "living_room", 1)
+    wavering = Compliance(1.0 - 1e-12, 0.0, tempted, 2.0, quits=0.0)
+    script = guest(house, dict.fromkeys(["cup", "mug"], "dish_bin"), here, compliance=wavering)
+    script.act(guidance=suggestion(house, here, VisitKind.PICK, "cup", cup))
+    assert script.act(seconds=0.1).shown
+    seen = {"mug": here + np.array([0.0, 1.0])}
+    assert len({script.act(seen).then for _ in range(30)}) == 1
+
+
+@pytest.mark.parametrize("shown", [False, True])
+def test_only_shown_flagpoles_make_the_guest_forget_walls(house, shown):
+    """The nearest object by walk differs from the nearest object on a straight line, behind a wall."""
+    for seed in range(200):
+        here, one, other = house.navmesh.sample(np.random.default_rng(seed), 3)
+        walks = house.geodesics.distances(np.array([here, one, other]))[0]
+        if math.dist(here, one) + 0.5 < math.dist(here, other) and walks[1] > walks[2] + 0.5:
+            break
+    places = {"cup": one, "mug": other}
+    script = guest(house, dict.fromkeys(places, "dish_bin"), here, walking=Walking(0.0, 3.0, 1.0))
+    roles = frozenset({FLAGPOLE} if shown else ())
+    script.act(places, shown_roles=roles, flagpoles=places if shown else {})
+    nearest = "cup" if shown else "mug"
+    assert script.participant._intention.aim == Visit(VisitKind.PICK, nearest)
+
+
 def test_a_guest_who_does_not_follow_may_choose_what_is_suggested_and_remembers_where_it_is(house):
     here, cup, mug = (place_in(house, "living_room", number) for number in (0, 6, 1))
     stubborn = Compliance(0.0, 0.0, 0.0, 2.0, quits=0.0)
