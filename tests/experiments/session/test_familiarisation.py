@@ -102,6 +102,15 @@ def test_the_camera_moves_smoothly_where_a_person_can_walk(house, path):
     assert set(path.positions[:, 2]) == {PersonParameters().eye_height}
 
 
+def test_a_walking_camera_looks_ahead_along_its_way(path):
+    """In curves the gaze leads the step, but it never turns away from it."""
+    steps = np.diff(path.positions[:, :2], axis=0)
+    walks = np.linalg.norm(steps, axis=1) > 0.98 * SPEED * STEP
+    away = np.arctan2(steps[:, 1], steps[:, 0]) - path.headings[:-1]
+    assert walks.sum() > 100
+    assert np.median(np.cos(away[walks])) > 0.99 and np.cos(away[walks]).min() > 0.0
+
+
 @pytest.mark.slow
 def test_what_rays_see_of_the_bins_is_what_the_picture_shows(house, path):
     compiled = compiled_house(house.catalogue)
