@@ -174,8 +174,40 @@ def test_a_platform_in_trouble_pays_once(paid, fault):
     assert {key: sent.state for key, sent in again.items()} == dict.fromkeys(first, "in doubt")
     paid.wait()
     before = paid.platform.moves
-    assert all(sent.state == "paid" for sent in paid.send().values())
+    assert {key: sent.state for key, sent in paid.send().items()} == dict.fromkeys(first, "paid")
     assert paid.platform.moves - before == (0 if fault.endswith("after") else 3), "only what it lacks is sent"
+    paid.check()
+
+
+def test_a_payment_in_doubt_stays_so_while_the_platform_answers_no_questions(paid, monkeypatch):
+    assert main(paid.words) == 0
+    paid.platform.faults.extend(["500 after"] * 3)
+    paid.send()
+    paid.wait()
+    monkeypatch.setenv(paid.platform.variable, "another")
+    (sent,) = paid.send().values()
+    assert (sent.state, sent.stops) == ("in doubt", True)
+    assert "did not tell whether it has paid: the platform rejects this secret" in sent.text
+    monkeypatch.setenv(paid.platform.variable, SECRET)
+    paid.send()
+    paid.check()
+
+
+def test_two_processes_that_send_at_the_same_time_pay_once(paid):
+    """The second process sends all other payments while the first process sends the first payment."""
+
+    async def run():
+        store, clients = await paid.open(), [payer(paid.study.settings) for _ in range(2)]
+        one, other = (Sender("paid", store, client).send() for client in clients)
+        sent = [await anext(one), *[result async for result in other], *[result async for result in one]]
+        for client in clients:
+            await client.close()
+        await store.close()
+        return [(result.key, result.state) for result in sent]
+
+    assert main(paid.words) == 0
+    owed = paid.owed()
+    assert sorted(asyncio.run(run())) == sorted((key, "paid") for key in owed)
     paid.check()
 
 
