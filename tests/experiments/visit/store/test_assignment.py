@@ -144,6 +144,12 @@ async def test_a_quota_can_be_changed_while_the_study_runs(store, arrive, assign
         await store.set_quota(0, -1, "ada")
 
 
+async def test_a_quota_of_zero_closes_a_cell(store, arrive, assign):
+    await store.set_quota(0, 0, "ada")
+    given = [await assign(await arrive(number)) for number in range(3)]
+    assert places(given) == [(1, 0), (1, 1)] and given[2] is None
+
+
 async def test_counts_by_status_and_cell(store, arrive, assign):
     people = [await arrive(number) for number in range(4)]
     for person in people[:3]:
