@@ -12,8 +12,10 @@ from store_clock import at
 
 from experiments.analysis.study.table import read_people
 from experiments.cli.main import main
+from experiments.errors import StoreError
 from experiments.study.data import retention
-from experiments.study.data.retention import forget_old
+from experiments.study.data.copies import note_copy
+from experiments.study.data.retention import Retained, forget_old
 from experiments.study.file import read_people_study
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
@@ -167,6 +169,18 @@ def test_a_backup_in_which_a_payment_was_owed_is_changed_too(served, tmp_path):
     assert traces(tmp_path, "bert-PID") == []
 
 
+def test_films_of_a_person_are_deleted_although_they_do_not_contain_the_name(served, tmp_path, capsys):
+    films = {name: tmp_path / f"{name}.mp4" for name in PEOPLE}
+    for name, film in films.items():
+        film.write_bytes(b"frames")
+        note_copy(Path(served[1]), "film", film, source=f"visits/{name[0] * 64}/task")
+    assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 0
+    assert f"{films['bert']} of " in capsys.readouterr().out
+    assert [name for name, film in films.items() if film.exists()] == ["anna", "cleo"]
+    assert main(["study", "erase", *served, "p00003", "--who", "me"]) == 0
+    assert str(films["bert"]) not in capsys.readouterr().out, "the list of copies no longer contains the film"
+
+
 def test_a_copy_that_was_moved_is_named(served, tmp_path, capsys):
     moved = [tmp_path / "backup.db", tmp_path / "runs.csv", tmp_path / "served" / "restored.db"]
     assert main(["study", "restore", str(moved[0]), str(moved[2])]) == 0
@@ -297,3 +311,25 @@ def test_the_server_forgets_every_day(served, tmp_path, monkeypatch):
     with pytest.raises((StopIteration, RuntimeError)):
         asyncio.run(days())
     assert traces(tmp_path, "bert-PID", "b" * 64) == []
+
+
+def test_the_server_reports_that_it_could_not_forget_and_tries_again_a_day_later(monkeypatch, caplog):
+    failures, pauses = [StoreError("the database is locked"), OSError("the disk is full")], []
+
+    async def forget(*_):
+        if failures:
+            raise failures.pop(0)
+        return Retained(("p00001", "p00002"), ("p00003",), ())
+
+    async def sleep(seconds):
+        pauses.append(seconds)
+        if len(pauses) == 3:
+            raise asyncio.CancelledError
+
+    monkeypatch.setattr(retention, "forget_old", forget)
+    monkeypatch.setattr(retention.asyncio, "sleep", sleep)
+    caplog.set_level("INFO", logger="mjsim.study")
+    with pytest.raises(asyncio.CancelledError):
+        asyncio.run(retention.forget_daily(None, Path("visits"), 30))
+    assert caplog.messages == ["the database is locked", "the disk is full", "2 people forgotten, 1 erased"]
+    assert pauses == [24 * 60 * 60] * 3
