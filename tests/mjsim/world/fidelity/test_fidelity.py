@@ -22,9 +22,10 @@ from mjsim.values.observation import ObjectStatus, StepStates
 from mjsim.values.options import FIDELITIES, WorldOptions
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.body.rig import HEADING, LOOK, PITCH, PITCH_RATE, TURN, TURN_RATE, VX, VY, X, Y
-from mjsim.world.fidelity import kinematics
+from mjsim.world.fidelity import kinematics, motion_planner
 from mjsim.world.fidelity import trunk_contact as trunk
 from mjsim.world.fidelity.kinematics import Gait
+from mjsim.world.fidelity.motion_planner import MotionPlanner
 from mjsim.world.state import WorldState
 from mjsim.world.walking.walker import BACK_OFF
 
@@ -312,6 +313,17 @@ def test_walls_that_meet_stop_a_person_and_never_push_one(slope, speed, aside):
         assert obstacles.distance(shapely.Point(body[[X, Y]])) > 0.2 - 1e-6
 
 
+@given(speed=st.floats(0.1, 20.0), forward=st.booleans())
+@settings(max_examples=60, deadline=None)
+def test_a_long_step_is_as_long_as_any_other_and_ends_at_a_thin_wall(speed, forward):
+    wall = np.array([[1.0, -2.0], [1.01, -2.0], [1.01, 2.0], [1.0, 2.0]])
+    floor, body = Floor.of_polygons((wall,), 0.2), standing(0.5, 0.0, heading=0.0)
+    body[VX] = speed if forward else -speed
+    end = 0.5 + body[VX] * 0.04
+    trunk.slide(body, 0.04, 0.2, floor)
+    assert body[X] == pytest.approx(min(end, 0.8), abs=1e-6)
+
+
 @given(points=st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=1, max_size=30))
 @settings(max_examples=60, deadline=None)
 def test_the_gap_to_an_outline_is_that_of_geometry(points):
@@ -501,6 +513,43 @@ def test_a_state_of_another_fidelity_is_refused(house):
     damaged[-2:] = 1.0
     with pytest.raises(StateError, match="rings"):
         world_of(house, "event").restore(WorldState(damaged, states["event"].details))
+
+
+def test_the_data_show_the_motion_that_is_in_progress(house):
+    """Rendering between two steps of a pick, and between two pauses, shows the person and the objects as they are."""
+    world = world_of(house, "event")
+    walk_to(world, 1.0, 2.4, within=0.1)
+    world.step(Pick("o0"))
+    seen = []
+    while world.busy:
+        for action in (Wait(world.observation().time + 0.2), Move()):
+            o = world.step(action).observation
+            assert world.data.time == o.time
+            assert np.array_equal(world.data.xpos[house.index.bodies], o.object_positions)
+            assert world.data.cam(avatar.EYE).xpos == pytest.approx(o.eye, abs=1e-9)
+        seen.append(o.object_positions[0])
+    assert np.ptp(seen, axis=0).max() > 0.1
+
+
+def test_a_motion_that_is_longer_than_its_buffer_is_planned_like_any_other(house, monkeypatch):
+    """Kernels write the states of a motion into the buffer without checking its size."""
+    room = MotionPlanner._room
+
+    def checked(planner, steps):
+        trajectory = room(planner, steps)
+        assert len(trajectory.vectors) == len(trajectory.poses) >= trajectory.length[0] + steps
+        return trajectory
+
+    monkeypatch.setattr(MotionPlanner, "_room", checked)
+    ends = []
+    for capacity in (1000, 1):
+        monkeypatch.setattr(motion_planner, "_INITIAL_STEPS", capacity)
+        world = world_of(house, "event")
+        events = [*fetch(world, "o0")]
+        walk_to(world, 0.9, 3.0)
+        face(world, 0.3, 3.7)
+        ends.append((events + do(world, Place("o0")), world.state_hash()))
+    assert ends[0] == ends[1]
 
 
 def test_the_data_are_in_step(house):
