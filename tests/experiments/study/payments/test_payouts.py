@@ -17,7 +17,7 @@ from study_database import new_database
 from experiments.cli.main import main
 from experiments.study.file import read_people_study
 from experiments.study.payments.payouts import Sender
-from experiments.study.payments.platform import TRIES
+from experiments.study.payments.platform import TRIES, DeclinedError, Payer, StoppedError, UnsureError
 from experiments.study.recruitment import payer
 from experiments.visit.store import Store
 from tests.experiments.study.platforms.connect import Connect
@@ -145,6 +145,92 @@ def paid(tmp_path, platform):
     return Paid(tmp_path, platform)
 
 
+class Scripted(Payer):
+    """A client that receives one answer to all payments, and another one to all questions about payments."""
+
+    def __init__(self, to_payments, to_questions):
+        self.to_payments, self.to_questions, self.payments = to_payments, to_questions, 0
+
+    async def send(self, _):
+        self.payments += 1
+        return self._answer(self.to_payments)
+
+    async def find(self, _):
+        return self._answer(self.to_questions)
+
+    def _answer(self, answer):
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+
+@pytest.fixture
+def send(tmp_path):
+    """Return a function that sends all owed payments with a client, and returns the result of each payment."""
+    platform = Prolific()
+    platform.name, platform.url = "prolific", "https://platform.example"
+    paid = Paid(tmp_path, platform)
+    assert main(paid.words) == 0
+
+    async def run(client):
+        store = await paid.open()
+        results = [(sent.state, sent.text) async for sent in Sender("paid", store, client).send()]
+        await store.close()
+        return results
+
+    def work(client):
+        results = asyncio.run(run(client))
+        assert len(paid.owed()) == (0 if {state for state, _ in results} == {"paid"} else 3)
+        paid.wait()
+        return results
+
+    return work
+
+
+CLOSED = DeclinedError("the submission is closed")
+LOST = UnsureError("no answer")
+STRANGE = KeyError("status")  # the answer has no such field
+STOPPED = StoppedError("no secret")
+DOUBT = "the platform did not tell whether it has paid: "
+
+
+@pytest.mark.parametrize(
+    ("to_payments", "to_questions", "result"),
+    [
+        ("receipt", LOST, ("paid", "receipt")),
+        (CLOSED, "approved", ("paid", "approved")),  # the researcher has paid on the platform's own page
+        (CLOSED, None, ("refused", "the submission is closed")),
+        (CLOSED, LOST, ("refused", "the submission is closed")),
+        (CLOSED, STRANGE, ("refused", "the submission is closed")),
+        (STOPPED, "approved", ("refused", "no secret")),
+        (LOST, "approved", ("in doubt", "no answer")),
+        (STRANGE, "approved", ("in doubt", "the platform's answer is not understood: KeyError('status')")),
+    ],
+)
+def test_a_payment_is_refused_only_if_the_platform_has_not_made_it(send, to_payments, to_questions, result):
+    assert send(Scripted(to_payments, to_questions)) == [result] * (1 if to_payments is STOPPED else 3)
+
+
+@pytest.mark.parametrize(
+    ("to_questions", "payments", "result"),
+    [
+        ("approved", 0, ("paid", "approved, as the platform says")),
+        (None, 3, ("paid", "receipt")),
+        (CLOSED, 0, ("in doubt", f"{DOUBT}the submission is closed")),
+        (STOPPED, 0, ("in doubt", f"{DOUBT}no secret")),
+        (LOST, 0, ("in doubt", f"{DOUBT}no answer")),
+        (STRANGE, 0, ("in doubt", f"{DOUBT}the platform's answer is not understood: KeyError('status')")),
+    ],
+)
+def test_a_payment_in_doubt_is_sent_again_only_if_the_platform_has_not_made_it(
+    send, to_questions, payments, result
+):
+    assert send(Scripted(LOST, LOST)) == [("in doubt", "no answer")] * 3
+    client = Scripted("receipt", to_questions)
+    assert send(client) == [result] * (1 if to_questions is STOPPED else 3)
+    assert client.payments == payments
+
+
 def test_what_is_owed_is_paid_once(paid, capsys):
     assert main([*paid.words, "--dry-run"]) == 0
     assert paid.platform.asked == [] and paid.owed() == []
@@ -176,20 +262,6 @@ def test_a_platform_in_trouble_pays_once(paid, fault):
     before = paid.platform.moves
     assert {key: sent.state for key, sent in paid.send().items()} == dict.fromkeys(first, "paid")
     assert paid.platform.moves - before == (0 if fault.endswith("after") else 3), "only what it lacks is sent"
-    paid.check()
-
-
-def test_a_payment_in_doubt_stays_so_while_the_platform_answers_no_questions(paid, monkeypatch):
-    assert main(paid.words) == 0
-    paid.platform.faults.extend(["500 after"] * 3)
-    paid.send()
-    paid.wait()
-    monkeypatch.setenv(paid.platform.variable, "another")
-    (sent,) = paid.send().values()
-    assert (sent.state, sent.stops) == ("in doubt", True)
-    assert "did not tell whether it has paid: the platform rejects this secret" in sent.text
-    monkeypatch.setenv(paid.platform.variable, SECRET)
-    paid.send()
     paid.check()
 
 
