@@ -18,6 +18,7 @@ from experiments.cli.main import main
 from experiments.errors import ConfigError, ReplayError
 from experiments.participants.distribution import Distribution, Distributions, distribution
 from experiments.participants.follower import Follower
+from experiments.participants.guest import PERSON
 from experiments.record import records
 from experiments.record.reader import read_run
 from experiments.record.records import EventLog, read_events
@@ -111,6 +112,14 @@ def test_people_stay_within_their_limits_and_describing_more_changes_nothing_els
     assert 1.0 <= one.walking_speed == two.walking_speed <= 1.3
     assert RANGES["reach"][0] <= two.reach <= RANGES["reach"][1]
     assert one == dataclasses.replace(PersonParameters(), walking_speed=one.walking_speed)
+
+
+def test_guests_walk_at_the_speeds_that_were_measured_for_adults():
+    """Means of comfortable walking speeds are 0.94 to 1.43 m/s (Bohannon and Williams Andrews 2011)."""
+    guests = Distributions.of(PERSON)
+    speeds = [drawn_person(guests, np.random.default_rng(seed)).walking_speed for seed in range(500)]
+    assert 0.94 <= min(speeds) < 0.96 and 1.41 < max(speeds) <= 1.43
+    assert np.mean(speeds) == pytest.approx(1.2, abs=0.02)
 
 
 @pytest.mark.parametrize(
