@@ -2,6 +2,7 @@
 
 import asyncio
 import dataclasses
+from datetime import UTC, datetime
 
 import msgspec
 import pytest
@@ -10,7 +11,7 @@ from experiments.cli.main import main
 from experiments.study.file import Pay, read_people_study
 from experiments.study.payments.rules import decide, due
 from experiments.trials.designs import FOLDER
-from experiments.visit.store import Store
+from experiments.visit.store import PersonRow, Store
 
 PAY = Pay(currency="EUR", reward=7.5, screen_out=0.51, bonus_for_all=1.0, partial=True)
 
@@ -64,6 +65,26 @@ def test_work_that_was_done_is_paid_however_it_ended(tmp_path, partial):
         "p00003-reward": 1000,
         "p00004-reward": 1000,
     }
+
+
+@pytest.mark.parametrize(
+    ("phase", "status", "reasons"),
+    [
+        ("device", "screened_out", {"screen_out": "screened out by device"}),
+        (
+            "task",
+            "screened_out",
+            {"screen_out": "no place was left", "bonus": "no place was left after 6 of 10 phases"},
+        ),
+        ("survey", "withdrawn", {"partial": "left after 7 of 10 phases"}),
+        ("survey", "timed_out", {"partial": "did not return after 7 of 10 phases"}),
+        ("debriefing", "timed_out", {"reward": "finished the study"}),
+    ],
+)
+def test_the_reason_of_a_payment_says_how_the_participation_ended(phase, status, reasons):
+    now = datetime(2026, 5, 1, 12, tzinfo=UTC)
+    person = PersonRow(1, "0" * 64, "link", status, phase, now, now, delete_wanted=False)
+    assert {payment.kind: payment.why for payment in due(with_pay(PAY), [person], ())} == reasons
 
 
 def granted(folder, *words):
