@@ -15,14 +15,23 @@ from experiments.record.columns import decode_action
 from experiments.record.files import CHECKSUMS, read_json, save_arrays, write_checksums
 from experiments.record.journal import Header, Journal, read_entries
 from experiments.record.reader import read_journal
-from experiments.record.records import EPISODE, EVENTS, METRICS, RECORDING, EventLog, read_events
+from experiments.record.records import EPISODE, EVENTS, METRICS, RECORDING, TRAJECTORY, EventLog, read_events
 from experiments.record.run_directory import run_directory
-from experiments.record.verify import _log, checksum_mismatches, damage
+from experiments.record.verify import (
+    _actions,
+    _checkpoints,
+    _lengths,
+    _log,
+    _settings,
+    checksum_mismatches,
+    damage,
+)
 from experiments.record.writer import RecordWriter
 from mjsim.values.actions import Move, Pick, Place
 from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.observation import ObjectStatus, Observation, Steps, StepStates
 from mjsim.world.health.monitor import HealthSample
+from mjsim.world.state import checkpoint_hash
 
 
 def observation(time=0.0, hands=(None, "b")):
@@ -176,13 +185,13 @@ def test_an_event_that_was_written_wrongly_is_found_with_its_line_and_step():
     assert found.message.startswith("line 1: events.jsonl has an invalid event")
 
 
-def logged_in_each_step(steps=6):
-    """A record in which an event is logged after each control step but the last one, and its log line by line."""
+def logged_in_each_step(steps=6, events=1):
+    """A record in which events are logged after each control step but the last one, and its log line by line."""
     writer = new_writer()
     writer.log.append(0.0, "start", episode_sha256="", objects=2, order=["b", "a"])
     for step in range(steps):
         writer.append(observation(step * 0.04), HealthSample(), step, Steps(Move()))
-        if step < steps - 1:
+        for _ in range(events if step < steps - 1 else 0):
             writer.log.append(step * 0.04 + 0.04, "picked", object=f"b{step}", receptacle=None)
     record = writer.record()
     return record, record.log.splitlines(keepends=True)
@@ -198,6 +207,105 @@ def test_a_changed_line_of_the_log_is_named_with_the_step_in_which_it_was_writte
     [found] = _log(changed)
     assert (found.step, found.file) == (max(0, line - 1), EVENTS)
     assert found.message == f"events.jsonl is not as written, at line {line + 1}"
+
+
+def test_a_changed_line_is_named_with_all_lines_of_its_step():
+    record, lines = logged_in_each_step(events=3)
+    lines[5] = lines[5].replace(b'"event"', b'"Event"')
+    [found] = _log(dataclasses.replace(record, log=b"".join(lines)))
+    assert (found.step, found.message) == (1, "events.jsonl is not as written, at line 5 to 7")
+
+
+STEPS = 6
+
+
+def checked(record):
+    """The mismatches in the arrays of a record, and between its start event and its episode."""
+    checks = (_lengths, _actions, _log, _checkpoints, _settings)
+    return [(found.step, found.file, found.message) for check in checks for found in check(record)]
+
+
+def with_checkpoints(**start):
+    """A record of six control steps with checkpoints at three of them."""
+    sha256 = hashlib.sha256(EPISODE_OF_TWO.to_json().encode()).hexdigest()
+    writer = new_writer()
+    writer.log.append(0.0, "start", **({"episode_sha256": sha256, "objects": 2, "order": ["b", "a"]} | start))
+    for step in range(STEPS):
+        writer.append(observation(step * 0.04), HealthSample(), step, Steps(Move()))
+    record, physics, details = writer.record(), np.arange(6.0).reshape(3, 2), ["{}", '{"hands": 1}', "[]"]
+    hashes = [checkpoint_hash(*state) for state in zip(physics, details, strict=True)]
+    checkpoints = {
+        "checkpoint_step": np.array([0, 2, 5]),
+        "checkpoint_physics": physics,
+        "checkpoint_details": np.array(details),
+        "checkpoint_hash": np.array(hashes, np.uint64),
+    }
+    return dataclasses.replace(record, recording={**record.recording, **checkpoints})
+
+
+def with_array(record, name, change):
+    """The record after a change of one array."""
+    where = "trajectory" if name in record.trajectory else "recording"
+    arrays = getattr(record, where)
+    return dataclasses.replace(record, **{where: {**arrays, name: change(arrays[name].copy())}})
+
+
+def increased(*rows):
+    """Return a function that adds 1 to some rows of an array."""
+
+    def change(array):
+        array[list(rows)] += 1
+        return array
+
+    return change
+
+
+OTHER_ACTION, OTHER_STATE = "the action is not the one", "the checkpoint is not the one"
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "step", "file", "message"),
+    [
+        ("time", lambda a: a[:4], 4, TRAJECTORY, "time has 4 steps where the states have 6"),
+        ("heading", lambda a: np.append(a, 0.0), 6, TRAJECTORY, "heading has 7 steps"),
+        ("action_hash", lambda a: a[:3], 3, RECORDING, "action_hash has 3 steps"),
+        ("log_size", lambda a: a[:3], 2, RECORDING, "log_size has 2 steps"),
+        ("log_hash", lambda a: a[:3], 2, RECORDING, "log_hash has 2 steps"),
+        ("action", increased(2, 4), 2, TRAJECTORY, OTHER_ACTION),
+        ("action_hash", increased(5), 5, TRAJECTORY, OTHER_ACTION),
+        ("checkpoint_physics", increased(1), 2, RECORDING, OTHER_STATE),
+        ("checkpoint_hash", increased(0), 0, RECORDING, OTHER_STATE),
+        ("checkpoint_step", lambda _: np.array([-3, 2, 5]), 0, RECORDING, OTHER_STATE),
+        ("checkpoint_step", lambda _: np.array([0, 2, 6]), 6, RECORDING, OTHER_STATE),
+        ("checkpoint_step", lambda _: np.array([0, 2, 9]), 6, RECORDING, OTHER_STATE),
+        ("checkpoint_details", lambda a: a[:1], 2, RECORDING, "checkpoints are missing"),
+        ("checkpoint_step", lambda a: a[:2], 0, RECORDING, "checkpoints are missing"),
+    ],
+)
+def test_a_damaged_array_is_named_with_the_first_step_that_it_affects(name, change, step, file, message):
+    record = with_checkpoints()
+    assert checked(record) == []
+    [found] = checked(with_array(record, name, change))
+    assert found[:2] == (step, file) and message in found[2]
+
+
+@pytest.mark.parametrize(
+    ("start", "file", "message"),
+    [
+        ({"episode_sha256": "0" * 64}, EPISODE, "episode.json is not the episode that was run"),
+        ({"objects": 3}, EVENTS, "the start event has 3 objects, the episode has 2"),
+        ({"order": ["b", "b"]}, EVENTS, "the start event has an order of other objects than the episode's"),
+    ],
+)
+def test_a_start_event_of_another_episode_is_named(start, file, message):
+    [found] = checked(with_checkpoints(**start))
+    assert found[:2] == (0, file) and found[2].endswith(message)
+
+
+def test_damage_is_listed_in_the_order_of_steps():
+    record = with_array(with_checkpoints(order=["b", "b"]), "action", increased(4))
+    found = damage(with_array(record, "checkpoint_physics", increased(1)))
+    assert [mismatch.step for mismatch in found] == [0, 0, 2, 4]
 
 
 @pytest.mark.parametrize("kept", range(1, 6))
