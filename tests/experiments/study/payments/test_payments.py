@@ -107,6 +107,7 @@ def test_a_payment_outside_the_rules_is_owed_once_and_audited(tmp_path, capsys):
 
     asyncio.run(ask(fill))
     assert granted(tmp_path, "p00004", "2.50", "--reason", "the server failed") == 0
+    assert "\np00004-grant-1  2.50 USD  the server failed  owed\n" in capsys.readouterr().out
     for words in (
         ("2.50", "--reason", "the server failed"),
         ("0",),
