@@ -161,9 +161,11 @@ def test_a_backup_in_which_a_payment_was_owed_is_changed_too(served, tmp_path):
             await getattr(store.ledger, event)(*values)
         await store.close()
 
-    asyncio.run(pay(("decide", 2, "reward", 750, "USD", "p00002-reward"), ("begin_sending", "p00002-reward")))
+    reward, bonus = "p00002-reward", "p00002-bonus"
+    decided = [("decide", 2, "reward", 750, "USD", reward), ("decide", 2, "bonus", 100, "USD", bonus)]
+    asyncio.run(pay(*decided, ("begin_sending", reward)))
     assert main(["study", "backup", *served, "--out", str(tmp_path / "owed.db")]) == 0
-    asyncio.run(pay(("confirm", "p00002-reward", 1, "a receipt")))
+    asyncio.run(pay(("begin_sending", bonus), *(("confirm", key, 1, "a receipt") for key in (reward, bonus))))
     assert traces(tmp_path, "bert-PID")
     assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 0
     assert traces(tmp_path, "bert-PID") == []
