@@ -151,6 +151,22 @@ async def test_who_is_forgotten_keeps_what_they_did_and_nothing_that_tells_who_t
     assert again.id not in (played.id, other.id) and not again.returning
 
 
+async def test_participants_of_another_study_in_the_same_database_are_not_erased_or_forgotten(
+    store, with_tables, arrive
+):
+    person = await arrive()
+    other = await Store.open(with_tables, "another", "0" * 64)
+    try:
+        assert await other.known(person.seen + timedelta(days=1)) == ()
+        await other.forget([person.id], ["c" * 64], "keep_days")
+        with pytest.raises(StoreError, match=f"no person {person.id}"):
+            await other.erase(person.id, "ada")
+    finally:
+        await other.close()
+    assert await store.person(person.id) == person
+    assert await store.identity(person.id) == {"participant": "p1"}
+
+
 async def test_nobody_is_erased_who_is_owed_something(store, arrive):
     person = await arrive()
     await store.ledger.decide(person.id, "reward", 750, "USD", "r")
