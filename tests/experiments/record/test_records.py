@@ -275,7 +275,7 @@ OTHER_ACTION, OTHER_STATE = "the action is not the one", "the checkpoint is not 
         ("action_hash", increased(5), 5, TRAJECTORY, OTHER_ACTION),
         ("checkpoint_physics", increased(1), 2, RECORDING, OTHER_STATE),
         ("checkpoint_hash", increased(0), 0, RECORDING, OTHER_STATE),
-        ("checkpoint_step", lambda _: np.array([-3, 2, 5]), 0, RECORDING, OTHER_STATE),
+        ("checkpoint_step", lambda _: np.array([-1, 2, 5]), 0, RECORDING, OTHER_STATE),
         ("checkpoint_step", lambda _: np.array([0, 2, 6]), 6, RECORDING, OTHER_STATE),
         ("checkpoint_step", lambda _: np.array([0, 2, 9]), 6, RECORDING, OTHER_STATE),
         ("checkpoint_details", lambda a: a[:1], 2, RECORDING, "checkpoints are missing"),

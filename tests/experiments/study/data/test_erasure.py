@@ -2,6 +2,7 @@
 
 import asyncio
 import datetime
+import os
 import shutil
 import sqlite3
 from contextlib import closing
@@ -10,7 +11,7 @@ from pathlib import Path
 import pytest
 from store_clock import at
 
-from experiments.analysis.study.table import read_people
+from experiments.analysis.study.table import ANALYSIS, FILES, read_people
 from experiments.cli.main import main
 from experiments.errors import StoreError
 from experiments.study.data import retention
@@ -21,6 +22,7 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.visit.folders import VisitFolders
 from experiments.visit.store import Store, utc_now
+from mjsim.support.files import WORK
 
 PEOPLE = ("anna", "bert", "cleo")
 TRACES = ("PID", "SUBMISSION", "key", "wrote")  # each with the name before it
@@ -183,6 +185,40 @@ def test_films_of_a_person_are_deleted_although_they_do_not_contain_the_name(ser
     assert str(films["bert"]) not in capsys.readouterr().out, "the list of copies no longer contains the film"
 
 
+def test_files_made_from_the_data_are_deleted_if_they_contain_the_person(served, tmp_path, capsys):
+    folder, table = Path(served[1]), tmp_path / "table"
+    # The list of copies in the study's folder does not contain the first analysis, as in earlier versions.
+    mine = [folder / ANALYSIS / FILES[0], table / ANALYSIS / FILES[0], tmp_path / "mine.csv"]
+    others = tmp_path / "others.csv"
+    for path in (*mine, others):
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("p00001" if path == others else f"p00001 {'b' * 64}")
+    note_copy(table, "analysis", table / ANALYSIS)
+    for path in (mine[2], others):
+        note_copy(folder, "metrics", path)
+    assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 0
+    said = capsys.readouterr().out
+    assert all(f"{made} " in said for made in (folder / ANALYSIS, table / ANALYSIS, mine[2]))
+    assert not any(path.exists() for path in mine)
+    assert others.exists() and str(others) not in said
+
+
+def test_files_that_a_killed_command_has_left_are_deleted(served, tmp_path):
+    """A process with the first of these numbers cannot exist. The second process is still running."""
+    lefts = {
+        number: [place / f"{WORK}{number}-left" for place in (tmp_path, Path(served[1]))]
+        for number in (99999999, os.getpid())
+    }
+    for left in (*lefts[99999999], *lefts[os.getpid()]):
+        left.mkdir()
+        (left / "texts.csv").write_text("bert-wrote")
+        for path in (left / "texts.csv", left):
+            os.utime(path, (0, 0))
+    assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 0
+    assert not any(left.exists() for left in lefts[99999999])
+    assert all((left / "texts.csv").exists() for left in lefts[os.getpid()])
+
+
 def test_a_copy_that_was_moved_is_named(served, tmp_path, capsys):
     moved = [tmp_path / "backup.db", tmp_path / "runs.csv", tmp_path / "served" / "restored.db"]
     assert main(["study", "restore", str(moved[0]), str(moved[2])]) == 0
@@ -236,10 +272,13 @@ def test_who_people_are_is_forgotten_by_date(served, tmp_path, capsys):
         finally:
             await store.close()
 
+    page = tmp_path / "page.html"
+    page.write_text(f"visits/{'b' * 64}/task")
+    note_copy(tmp_path / "served", "page", page)
     assert asyncio.run(forget(29)).forgotten == ()
     planned = asyncio.run(forget(31, dry=True))
     assert (planned.forgotten, planned.erased, planned.unpaid) == (("p00002",), ("p00003",), ("p00001",))
-    assert traces(tmp_path / "served", "bert-PID")
+    assert traces(tmp_path / "served", "bert-PID") and page.exists()
     assert asyncio.run(forget(32)) == planned
     log = [(row.who, row.action, row.details) for row in asyncio.run(audit_log(served))]
     assert ("keep_days", "people forgotten", {"people": [2]}) in log
@@ -315,17 +354,25 @@ def test_the_server_forgets_every_day(served, tmp_path, monkeypatch):
     assert traces(tmp_path, "bert-PID", "b" * 64) == []
 
 
-def test_the_server_reports_that_it_could_not_forget_and_tries_again_a_day_later(monkeypatch, caplog):
-    failures, pauses = [StoreError("the database is locked"), OSError("the disk is full")], []
+def test_the_server_reports_what_it_forgot_and_tries_again_a_day_after_a_failure(monkeypatch, caplog):
+    results = [
+        StoreError("the database is locked"),
+        OSError("the disk is full"),
+        Retained(("p00001", "p00002"), (), ()),
+        Retained((), ("p00003",), ()),
+        Retained((), (), ("p00004",)),
+    ]
+    pauses = []
 
     async def forget(*_):
-        if failures:
-            raise failures.pop(0)
-        return Retained(("p00001", "p00002"), ("p00003",), ())
+        result = results[len(pauses)]
+        if isinstance(result, Exception):
+            raise result
+        return result
 
     async def sleep(seconds):
         pauses.append(seconds)
-        if len(pauses) == 3:
+        if len(pauses) == len(results):
             raise asyncio.CancelledError
 
     monkeypatch.setattr(retention, "forget_old", forget)
@@ -333,5 +380,10 @@ def test_the_server_reports_that_it_could_not_forget_and_tries_again_a_day_later
     caplog.set_level("INFO", logger="mjsim.study")
     with pytest.raises(asyncio.CancelledError):
         asyncio.run(retention.forget_daily(None, Path("visits"), 30))
-    assert caplog.messages == ["the database is locked", "the disk is full", "2 people forgotten, 1 erased"]
-    assert pauses == [24 * 60 * 60] * 3
+    assert caplog.messages == [
+        "the database is locked",
+        "the disk is full",
+        "2 people forgotten, 0 erased",
+        "0 people forgotten, 1 erased",
+    ]
+    assert pauses == [24 * 60 * 60] * len(results)
