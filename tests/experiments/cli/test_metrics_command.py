@@ -1,6 +1,7 @@
 """`mjsim metrics`: the numbers of metrics.json from log and trajectory alone, for a run and for a batch."""
 
 import csv
+import json
 import shutil
 from pathlib import Path
 
@@ -59,6 +60,16 @@ def test_metrics_that_say_something_else_are_named(run, tmp_path, capsys):
     printed = capsys.readouterr()
     assert "metrics.json differs from these metrics of the log" in printed.err
     assert "0.99" not in printed.out
+
+
+@pytest.mark.parametrize("number", [1, 4])
+def test_an_event_that_lacks_its_time_is_named_with_its_line(run, tmp_path, capsys, number):
+    folder = shutil.copytree(run, tmp_path / "run")
+    lines = (folder / records.EVENTS).read_text().splitlines()
+    lines[number] = json.dumps({key: value for key, value in json.loads(lines[number]).items() if key != "t"})
+    (folder / records.EVENTS).write_text("\n".join([*lines, ""]))
+    assert main(["metrics", str(folder)]) == 2
+    assert f"{records.EVENTS}, line {number + 1}: " in capsys.readouterr().err
 
 
 def test_a_batch_gives_a_row_per_trial_and_names_those_that_cannot_be_measured(batch, capsys):
