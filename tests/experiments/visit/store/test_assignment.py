@@ -86,20 +86,22 @@ async def test_an_abandoned_place_goes_to_the_next_person_and_a_finished_one_doe
     assert await assign(people[6], now=later) is None
 
 
-async def test_there_is_room_for_the_places_that_nobody_holds_or_is_on_the_way_to(store, arrive, assign):
+async def test_room_is_the_number_of_places_that_no_active_participant_holds_or_still_needs(
+    store, arrive, assign
+):
     async def room(now):
         with at(now):
             return await store.room([3, 2], "consent", ABANDONED)
 
     person = await arrive(0)
     start = person.created
-    assert await room(start) == 5, "who has only just opened the link may leave again"
+    assert await room(start) == 5, "a participant in the first phase needs no place yet"
     await assign(person, now=start)
     assert await room(start) == 4
     await arrive(1, phase="instructions")
     assert await room(start) == 3
     assert await room(start + ABANDONED / 2) == 3
-    assert await room(start + 2 * ABANDONED) == 5, "both have been away for too long"
+    assert await room(start + 2 * ABANDONED) == 5, "both participants have been inactive for too long"
 
 
 async def test_who_comes_back_gets_the_same_place_if_it_is_free_else_another(store, arrive, assign):
