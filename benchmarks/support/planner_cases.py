@@ -1,9 +1,18 @@
-"""Routing problems of five kinds for the planner benchmark, which are the same on every machine."""
+"""Routing problems of six kinds for the planner benchmark, which are the same on every machine.
 
+Problems of the kind "meals" are published (Grubhub, TSPPD Test Instance Library, github.com/grubhub/tsppdlib).
+`meal_deliveries.json` contains the lower triangles of their symmetric matrices of travel times, in seconds. The first
+location is the start, and the others are the pickup and the delivery of each order. The published problems have no
+capacity; here it is 2. Some detours are quicker than the direct way, and replace its travel time.
+"""
+
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+from scipy.sparse.csgraph import shortest_path
 
 from experiments.house import House
 from planner.problem import RoutingProblem, Shipment
@@ -12,6 +21,7 @@ from planner.task_problems import RESOLUTION, TaskProblems
 
 SIDE = 12.0  # side of the square that contains the places of random problems, in metres
 BINS = 6  # number of bins of random problems
+MEALS = Path(__file__).with_name("meal_deliveries.json")
 ROOMS = 6  # rooms of a generated home, so that there is space for 24 objects
 # Number of problems by kind and number of objects, 500 in total
 COUNTS: Mapping[str, Mapping[int, int]] = {
@@ -19,7 +29,8 @@ COUNTS: Mapping[str, Mapping[int, int]] = {
     "mid-task": {6: 30, 12: 30, 18: 30, 24: 30, 30: 12, 40: 8},
     "home": {6: 20, 12: 20, 18: 20, 24: 20},
     "random": {12: 20, 24: 20, 30: 10, 40: 10, 60: 10},
-    "many bins": {6: 20, 12: 30, 18: 20},
+    "many bins": {6: 10, 12: 20, 18: 10},
+    "meals": {6: 10, 12: 10, 15: 10},
 }
 
 
@@ -47,6 +58,8 @@ def _problem(
 ) -> RoutingProblem:
     if kind in ("random", "many bins"):
         return random_problem(objects, BINS if kind == "random" else objects, seed)
+    if kind == "meals":
+        return meal_problem(objects, seed)
     name = f"generated:{seed}?rooms={ROOMS}" if kind == "home" else "apartment"
     if name not in houses:
         house = House.load(name)
@@ -64,6 +77,16 @@ def random_problem(objects: int, bins: int, seed: int) -> RoutingProblem:
     distances = np.linalg.norm(places[:, None] - places, axis=2)
     shipments = tuple(Shipment(1 + bins + k, 1 + k % bins) for k in range(objects))
     return RoutingProblem(distances, 0, shipments, resolution=RESOLUTION)
+
+
+def meal_problem(orders: int, number: int) -> RoutingProblem:
+    """Return a published problem, whose distances are travel times in seconds."""
+    triangle = json.loads(MEALS.read_text(encoding="utf-8"))[str(orders)][number]
+    places = 2 * orders + 1
+    times = np.zeros((places, places))
+    times[np.tril_indices(places, -1)] = triangle
+    shipments = tuple(Shipment(k, k + 1) for k in range(1, places, 2))
+    return RoutingProblem(shortest_path(times, directed=False), 0, shipments, resolution=1.0)
 
 
 def first_state(house: House, objects: int, seed: int) -> TaskState:

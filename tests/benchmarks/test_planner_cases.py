@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from benchmarks.support.planner_cases import COUNTS, make_cases, random_problem
+from benchmarks.support.planner_cases import COUNTS, make_cases, meal_problem, random_problem
 
 
 def test_there_are_five_hundred_problems():
     assert sum(sum(sizes.values()) for sizes in COUNTS.values()) == 500
-    assert len(COUNTS) == 5
+    assert len(COUNTS) == 6
 
 
 def test_equal_seeds_give_equal_problems():
@@ -29,3 +29,12 @@ def test_equal_seeds_give_equal_problems():
 def test_each_object_has_its_own_bin_if_there_are_many():
     shipments = random_problem(18, 18, 0).shipments
     assert len({s.delivery for s in shipments}) == len({s.pickup for s in shipments}) == 18
+
+
+def test_a_published_problem_keeps_travel_times_unless_a_detour_is_quicker():
+    problem = meal_problem(6, 0)
+    assert [(s.pickup, s.delivery) for s in problem.shipments] == [(k, k + 1) for k in range(1, 13, 2)]
+    published = [582, 455, 655, 547, 134, 646, 730, 674, 310, 671]  # the triangle's first rows
+    assert [problem.distances[k, i] for k in range(5) for i in range(k)] == published
+    detours = problem.distances[:, :, None] + problem.distances[None]
+    assert (detours.min(axis=1) == problem.distances).all()
