@@ -1,7 +1,7 @@
 """The exact planner for a capacity of one or two, which finds tours and proves that they are optimal.
 
-The entry point is `solver.ExactSolver`. The module `table` contains the equations, and the section "How the
-proof works" in docs/planners.md explains the method.
+The entry point is `solver.ExactSolver`. The module `table` contains the equations, and the section "How the exact
+planner works" in docs/planners.md explains the methods.
 
     solver        the planner, which uses a full table, a search, branch and cut, or OR-Tools
     full_table    a table over all subsets of the objects
