@@ -47,7 +47,7 @@ def test_a_command_starts_no_other_process_for_opengl(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("choice", ["foo", "osmesa"])
+@pytest.mark.parametrize("choice", ["foo", pytest.param("osmesa", marks=pytest.mark.long)])
 def test_a_run_without_opengl_keeps_its_record(choice, tmp_path, mjsim):
     """A floor plan is drawn on a picture of the house, which is in the cache if the house was drawn before."""
     run = mjsim("run", *FAST, "--out", "out", MUJOCO_GL=choice)

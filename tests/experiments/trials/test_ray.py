@@ -70,6 +70,7 @@ def test_a_node_that_is_killed_loses_nobody_and_changes_nothing(cluster, tmp_pat
     assert written(tmp_path / "ray") == written(tmp_path / "here")  # and no work folder or mark is left
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("cluster")
 def test_a_trial_that_kills_its_process_is_tried_twice(tmp_path, own_module, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -134,6 +135,7 @@ def test_sigterm_ends_the_batch_with_our_line(tmp_path):
     assert not list(trials.glob(".*"))
 
 
+@pytest.mark.long
 def test_a_head_that_dies_ends_the_batch_with_an_error(cluster, tmp_path, monkeypatch):
     """The last test of this cluster."""
     monkeypatch.setattr(ray_workers, "HEAD_TIMEOUT_S", 1.0)

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 SOCKETS = int(os.environ.get("MJSIM_FAULTS", "400"))
 
 
-@pytest.mark.parametrize("nginx", [False, True])
+@pytest.mark.parametrize("nginx", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_a_hostile_machine_disturbs_nobody(tmp_path, nginx):
     if nginx and NGINX is None:
         pytest.skip("no NGINX on this machine")

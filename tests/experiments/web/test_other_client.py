@@ -15,7 +15,7 @@ MOVED = 0.3  # m between two snapshots, which nobody walks
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay", [0.0, 0.1])
+@pytest.mark.parametrize("delay", [pytest.param(0.0, marks=pytest.mark.long), 0.1])
 def test_another_client_does_a_task(tmp_path, delay):
     words = ("--objects", "1", "--assistance", "guided", "--phases", "task", *FAST)
     with PlayProcess(tmp_path / "visits", *words) as server:

@@ -38,7 +38,9 @@ def check_episode(house, folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["apartment", "generated:7?rooms=5", "generated:31?rooms=2"])
+@pytest.mark.parametrize(
+    "name", ["apartment", "generated:7?rooms=5", pytest.param("generated:31?rooms=2", marks=pytest.mark.long)]
+)
 def test_a_house_comes_back_with_its_rooms_floor_and_bins(tmp_path, name, capsys):
     out = tmp_path / "habitat"
     options = ["--episodes", "2", "--objects", "3", "--seed", "3", "--out", str(out)]
