@@ -187,7 +187,8 @@ def test_only_the_platform_may_embed_the_study(tmp_path):
 
 def test_in_a_lab_nothing_leads_back_to_the_person_before(tmp_path):
     with serving(tmp_path, with_recruitment(Recruitment(platform="lab"))) as client:
-        assert "start.js" not in client.get("/").text
+        welcome = client.get("/").text
+        assert "start.js" not in welcome and "data-forgets" in welcome
         first, second = begin(client), begin(client)
         assert first != second
         post(client, first, phase="consent", agree="no")

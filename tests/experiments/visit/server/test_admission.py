@@ -162,6 +162,7 @@ def test_only_new_people_count_towards_the_limit_of_an_address(tmp_path, monkeyp
         assert {site.begin(client, **ids(number)) for number in (0, 1, 0, 2, 0, 1)} > links
         refused = client.post("/begin", data=ids(3))
         assert refused.status_code == 429 and 'value="person000003"' in refused.text
+        assert refused.headers["retry-after"] == "60"
         assert site.begin(client, **ids(2)), "who has begun may always return"
     monkeypatch.undo()
 

@@ -158,6 +158,19 @@ def send_shown(client, link, **answers):
     return client.get(answer.headers["location"]).text
 
 
+def test_the_welcome_page_warns_of_the_check_of_the_computer_if_there_is_one(tmp_path, study):
+    needed = plan_of(study, None).device
+    for phases in (study.settings.phases, tuple(name for name in study.settings.phases if name != "device")):
+        folder = tmp_path / f"{len(phases)}"
+        folder.mkdir()
+        changed = dataclasses.replace(study, settings=msgspec.structs.replace(study.settings, phases=phases))
+        with serving(folder, changed) as client:
+            page = client.get("/").text
+            assert ("suitable.js" in page) is ("device" in phases)
+            assert (f'id="unsuitable" data-width="{needed.width}"' in page) is ("device" in phases)
+            assert "data-forgets" not in page
+
+
 def test_a_computer_that_does_not_fit_may_be_given_up(client, study):
     link = begin(client)
     go_to(client, link, study, "device")
