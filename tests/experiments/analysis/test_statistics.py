@@ -316,6 +316,30 @@ def test_the_mixed_model_by_dense_matrices(spread, with_age):
         assert test.p == pytest.approx(stats.f.sf(statistic, len(rows), df2), rel=1e-6)
 
 
+@pytest.mark.parametrize("spread", [0.8, 0.15, 0.0])
+def test_the_ends_of_an_interval_of_a_share_are_as_unlikely_as_its_level_says(spread):
+    """The profile of the restricted likelihood, written out with the covariance of all people."""
+    rng = np.random.default_rng(int(100 * spread))
+    house, condition = rng.integers(0, 12, 90), rng.choice([*"abc"], 90)
+    y = rng.normal(size=90) + rng.normal(0, spread, 12)[house]
+    x, z = 1.0 * (condition[:, None] == [*"abc"]), 1.0 * (house[:, None] == np.arange(12))
+
+    def deviance(share):
+        covariance = share * z @ z.T + (1 - share) * np.eye(90)
+        inverse = np.linalg.inv(covariance)
+        of_effects = x.T @ inverse @ x
+        rest = y - x @ np.linalg.solve(of_effects, x.T @ inverse @ y)
+        sizes = np.linalg.slogdet(covariance).logabsdet + np.linalg.slogdet(of_effects).logabsdet
+        return sizes + 87 * math.log(rest @ inverse @ rest)
+
+    found = mixed_model(y, condition, np.full(90, 6), {"house": house}).random["house"]
+    (low, high), limit = found.interval, stats.chi2.ppf(0.95, 1)
+    assert low <= found.share <= high < 1
+    rises = [deviance(end) - deviance(found.share) for end in (low, high)]
+    assert rises[1] == pytest.approx(limit, abs=1e-3)
+    assert rises[0] == pytest.approx(limit, abs=1e-3) if low else rises[0] <= limit
+
+
 @given(st.lists(st.floats(0.5, 1.9) | st.floats(2.1, 3.5) | st.floats(3.5, 200.0), min_size=2, max_size=6))
 def test_the_joint_f_test_has_the_mean_of_its_parts(freedom):
     """By Fai and Cornelius, the mean of F is that of the squared t values, whose mean is df / (df - 2) above 2."""
