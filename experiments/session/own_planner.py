@@ -13,6 +13,7 @@ from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem
 from planner.solvers import SolveLimit, Solver, solver
 
+END = object()  # follows the last plan that a planner yields
 CLAIM_TOLERANCE = 1e-6  # maximum relative error in the length or bound that a planner reports
 
 
@@ -52,7 +53,7 @@ class OwnPlanner:
         if hasattr(self._planner, "improve"):
             with user_code(self._planner, self._what):
                 plans = iter(self._planner.improve(_copied(problem), seed=seed, limit=limit))
-            while (given := self._next(plans)) is not None:
+            while (given := self._next(plans)) is not END:
                 plan = self._checked(problem, given)
                 yield plan
         else:
@@ -64,11 +65,9 @@ class OwnPlanner:
         if bounded.improves_on(plan):
             yield bounded
 
-    def _next(self, plans: Iterator[Plan]) -> object | None:
+    def _next(self, plans: Iterator[Plan]) -> object:
         with user_code(self._planner, self._what):
-            for plan in plans:
-                return plan if plan is not None else "None"
-        return None
+            return next(plans, END)
 
     def _asked(self, problem: RoutingProblem, seed: int, limit: SolveLimit | None) -> Plan:
         with user_code(self._planner, self._what):

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 from user_code import planner
 
@@ -10,10 +11,13 @@ from experiments.errors import UserCodeError
 from experiments.record import records
 from experiments.record.files import read_json
 from experiments.record.records import read_events
+from experiments.session.own_planner import planner_named
 from experiments.trials.replay.replay import replay
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from faults.conftest import one_line
+from planner.problem_json import problem_from_json
+from planner.solvers import solver
 
 # The tour to the nearest first is 14.5 m long, the shortest 11 m.
 LINE = [0.0, 2.0, -2.5, 6.0]
@@ -92,6 +96,58 @@ def test_regrets_and_bounds_of_a_trial_are_true_whatever_its_planner_claims(hous
     assert told["total_regret_m"] > 0
     assert told["reach_bound_m"] == exact["reach_bound_m"]
     assert replay(tmp_path / "own", house=house).ended == "all delivered"
+
+
+IMPROVING = """
+from dataclasses import replace
+from planner.greedy_solver import GreedySolver
+from planner.plan import Status
+from planner.solvers import solver
+class Own:
+    def solve(self, problem, *, seed=0, limit=None): ...
+    def improve(self, problem, *, seed=0, limit=None):
+        plan = GreedySolver().solve(problem)
+        {statement}
+"""
+
+
+def improved_by(own_module, statement, problem=PROBLEM):
+    """The lengths, bounds and proofs of the plans that a planner with these statements yields."""
+    own_module(IMPROVING.format(statement=statement))
+    plans = planner_named("own_code:Own").improve(problem_from_json(json.dumps(problem)))
+    return [(plan.cost, plan.lower_bound, plan.status.value) for plan in plans]
+
+
+def test_plans_that_a_planner_improves_have_bounds_of_ours(own_module):
+    better = "yield plan; yield solver('exact').solve(problem)"
+    assert improved_by(own_module, better) == [(14.5, 11.0, "feasible"), (11.0, 11.0, "optimal")]
+    claimed = "yield replace(plan, status=Status.OPTIMAL)"
+    assert improved_by(own_module, claimed) == [(14.5, 11.0, "feasible")]
+
+
+def test_the_last_plan_of_a_planner_is_yielded_again_with_the_bound_of_the_exact_planner(own_module):
+    places = np.random.default_rng(0).uniform(0, 9, 17).tolist()  # more than are all tried
+    shipments = [{"pickup": k, "delivery": k + 8} for k in range(1, 9)]
+    problem = {"distances": [[abs(a - b) for b in places] for a in places], "shipments": shipments}
+    best = solver("exact").solve(problem_from_json(json.dumps(problem))).cost
+    (cost, weak, _), last = improved_by(own_module, "yield plan", problem)
+    assert weak < best < cost and last == (cost, pytest.approx(best), "feasible")
+
+
+@pytest.mark.parametrize(
+    ("statement", "fault"),
+    [
+        ("yield plan; yield None", "answered None"),
+        ("yield plan; 1 / 0", "raised ZeroDivisionError"),
+        ("yield replace(plan, cost=1.0)", "m long, not"),
+        ("return\n        yield", "gave no plan"),
+        ("return None", "raised TypeError"),
+    ],
+)
+def test_a_planner_that_improves_nothing_valid_is_named(own_module, statement, fault):
+    with pytest.raises(UserCodeError, match=fault) as caught:
+        improved_by(own_module, statement)
+    assert str(caught.value).startswith("planner 'own_code:Own'")
 
 
 @pytest.mark.parametrize("statement", ["return replace(plan, cost=plan.cost / 2)", "raise SystemExit(0)"])

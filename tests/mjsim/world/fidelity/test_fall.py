@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 from small_worlds import scene_of, world_of
 
 from mjsim.house.scene.avatar import LEFT, RIGHT
@@ -57,6 +58,21 @@ def moved(kinematic, seconds):
     state.vector[HANDS:HAND_SPEEDS] += seconds * state.vector[HAND_SPEEDS : HAND_SPEEDS + 6]
     carry(state, kinematic.model)
     return state.poses
+
+
+@pytest.mark.parametrize("grip", [0, 1])
+def test_a_held_object_is_turned_as_its_grip_says_however_it_lay(tier, grip):
+    tier.reset()
+    kinematic = tier._kinematic
+    lay = Rotation.from_euler("xyz", (0.3, -0.4, 0.5))
+    kinematic.state.poses[CUBE, 3:] = lay.as_quat(scalar_first=True)
+    kinematic.state.vector[BODY + HEADING] = 2.0
+    kinematic.grasp(LEFT, CUBE, grip)
+    held = kinematic.state.poses[CUBE, 3:]
+    assert np.linalg.norm(held) == pytest.approx(1.0)
+    site = Rotation.from_quat(tier._full.scene.model.site(f"o{CUBE}/grip_{grip}").quat, scalar_first=True)
+    turned = Rotation.from_quat(held, scalar_first=True) * site
+    assert turned.as_matrix() == pytest.approx(Rotation.from_euler("z", 2.0).as_matrix(), abs=1e-12)
 
 
 @given(body=st.lists(speeds, min_size=12, max_size=12), hands=st.lists(speeds, min_size=6, max_size=6))
