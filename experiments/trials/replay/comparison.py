@@ -26,6 +26,7 @@ from experiments.record.records import EVENTS, PHASE_ENDED, RECORDING, TRAJECTOR
 from experiments.record.verify import Mismatch
 from experiments.session.assistant import WORLD_EVENTS
 from experiments.session.familiarise import watch_flythrough
+from experiments.trials.design import counted
 from experiments.trials.replay.replayer import Replayer
 
 # Events that a replay recomputes. Plans and regrets are copied from the log instead of being computed again,
@@ -205,11 +206,13 @@ def _checked(record: Record, name: str, first: int) -> str:
         case records.EPISODE:
             return "the episode of the log"
         case records.EVENTS:
-            return f"{len(record.events)} events, simulated again{start}; plans and regrets by hash"
+            events = counted(len(record.events), "event")
+            return f"{events}, simulated again{start}; plans and regrets by hash"
         case records.TRAJECTORY:
-            return f"{record.steps} steps, simulated again{start}"
+            return f"{counted(record.steps, 'step')}, simulated again{start}"
         case records.RECORDING:
-            return f"{record.steps} states and {len(record.checkpoint_steps)} checkpoints{start}"
+            checkpoints = counted(len(record.checkpoint_steps), "checkpoint")
+            return f"{counted(record.steps, 'state')} and {checkpoints}{start}"
         case records.PLAN:
             return "the plans of the log"
         case records.METRICS:
