@@ -242,6 +242,19 @@ def test_an_object_knocked_out_of_its_receptacle_is_loose_again(make):
     assert world.observation().object_status == (ObjectStatus.LOOSE,)
 
 
+@pytest.mark.parametrize(("outside", "stays"), [(-0.02, True), (0.02, True), (0.04, False)])
+def test_an_object_stays_delivered_up_to_3_cm_beside_its_receptacle(make, outside, stays):
+    world = delivered(make)
+    tier, crate = world._tier, world.scene.receptacles["crate"]
+    address = int(world.scene.index.qpos[0])
+    offset = tier.person.center(0) - world.data.qpos[address : address + 3]
+    for side in (*np.eye(3), *-np.eye(3)):
+        center = crate.center + crate.rotation @ (side * (crate.half_size + outside))
+        world.data.qpos[address : address + 3] = center - offset
+        mujoco.mj_forward(world.scene.model, world.data)
+        assert tier._in_place(0) is stays
+
+
 @tiers
 def test_a_path_that_is_followed_while_busy_waits_for_one_step(make, fidelity):
     walking, idle = (make((1.5, 2.0, 0.0), ("cube", 2.2, 2.0), fidelity=fidelity) for _ in range(2))
