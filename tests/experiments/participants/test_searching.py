@@ -142,6 +142,16 @@ def test_a_searcher_turns_around_at_each_place_of_a_room_and_then_goes_to_the_ne
     assert rooms[:-1] == ["bedroom"] * len(house.viewpoints["bedroom"]) and rooms[-1] != "bedroom"
 
 
+def test_a_searcher_looks_around_from_half_a_metre_before_a_place(house):
+    script = searcher(house, place_in(house, "living_room"), "cup")
+    while not isinstance(walk := script.act(), FollowPath):
+        script.turn()
+    assert walk.stop_distance == 0.5
+    for distance, walks in ((0.55, True), (0.45, False)):
+        action = script.act(position=place_near(house, walk.goal, distance))
+        assert isinstance(action, FollowPath) is walks
+
+
 def test_a_turn_that_a_find_interrupts_starts_again(house):
     here = place_in(house, "bedroom")
     script = searcher(house, here, "cup", "mug")
