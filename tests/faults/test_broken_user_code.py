@@ -108,6 +108,13 @@ def test_a_call_that_takes_too_long_is_interrupted_and_says_where(
     check_kept(house, tmp_path / "out", "did not answer")
 
 
+def test_a_time_limit_of_calls_that_is_no_number_is_named(house, tmp_path, own_module, monkeypatch):
+    monkeypatch.setenv("MJSIM_CALL_LIMIT", "short")
+    own_module(participant("pass"))
+    with pytest.raises(ConfigError, match="MJSIM_CALL_LIMIT is 'short'; give a number of seconds"):
+        run(house, tmp_path / "out", assistance="none", user="own_code:build")
+
+
 def test_the_folder_in_which_a_command_runs_is_its_own(tmp_path, own_module, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     own_module(participant("os.chdir('/')", after=3))
