@@ -7,9 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from scripted_percepts import place_in
+from scripted_percepts import Script, place_in
 
 from experiments.participants.base import NEARBY
+from experiments.participants.nearest import Nearest
+from experiments.participants.searcher import Searcher
 from experiments.participants.visit_executor import ARRIVED, BinSearch
 from mjsim.values.actions import Move
 from mjsim.values.person_parameters import PersonParameters
@@ -66,6 +68,15 @@ class Crowded:
 
     def __getattr__(self, name):
         return getattr(self._house, name)
+
+
+@pytest.mark.parametrize("make", [Nearest, lambda house: Searcher(house, np.random.default_rng(0))])
+def test_bins_in_view_are_remembered_also_while_there_is_nothing_to_visit(unseen, make):
+    participant = make(unseen)
+    script, (seen, *others) = Script(participant, {}, place_in(unseen, "bedroom")), unseen.receptacles
+    script.act(look_for=lambda unknown: {seen} & set(unknown))
+    known = participant._executor._bins.knows
+    assert known(seen) and not all(map(known, others))
 
 
 def test_in_a_room_without_viewpoints_a_search_begins_at_the_bin(house, unseen):

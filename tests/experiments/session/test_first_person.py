@@ -1,6 +1,7 @@
 """What a film shows: the whole view of the participant, and the panels of the HUD next to it."""
 
 import dataclasses
+import math
 
 import av
 import msgspec
@@ -98,6 +99,17 @@ def test_a_minimap_shows_the_house_from_above_also_if_its_picture_is_drawn_late(
             frames.append(drawn.frame(world.data, state))
     assert state.minimap is not None
     assert (frames[0] == frames[1]).all()
+
+
+@pytest.mark.slow
+def test_a_film_has_the_horizontal_field_of_view_that_the_person_has_chosen(house, scene, begun):
+    world, _, _ = begun
+    for chosen in (1.2, 1.9):
+        film = dataclasses.replace(FILM, field_of_view=chosen)
+        with FirstPersonRenderer(scene, house, film) as renderer:
+            camera = renderer._camera(world.data)
+        _, _, width, height = film.view
+        assert 2.0 * math.atan(math.tan(camera.fovy / 2.0) * width / height) == pytest.approx(chosen)
 
 
 @pytest.fixture(scope="module")
