@@ -127,7 +127,5 @@ def solver(name: str) -> Solver:
             "modules are searched for in the current folder and among those installed"
         ) from error
     if not callable(getattr(found, "solve", None)):
-        raise PlannerError(
-            f"planner {name!r} makes an object of {type(found).__name__}, which has no method solve"
-        )
+        raise PlannerError(f"planner {name!r} makes {type(found).__name__}, which has no method solve")
     return cast(Solver, found)
