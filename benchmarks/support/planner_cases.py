@@ -1,9 +1,10 @@
-"""Routing problems of six kinds for the planner benchmark, which are the same on every machine.
+"""Routing problems for the planner benchmark. There are six kinds, and each is the same on every machine.
 
-Problems of the kind "meals" are published (Grubhub, TSPPD Test Instance Library, github.com/grubhub/tsppdlib).
-`meal_deliveries.json` contains the lower triangles of their symmetric matrices of travel times, in seconds. The first
-location is the start, and the others are the pickup and the delivery of each order. The published problems have no
-capacity; here it is 2. Some detours are quicker than the direct way, and replace its travel time.
+The kind "meals" contains published meal delivery problems (Grubhub, TSPPD Test Instance Library,
+github.com/grubhub/tsppdlib). The file `meal_deliveries.json` contains the lower triangle of each symmetric matrix of
+travel times, in seconds. The first location is the start. The others are the pickup and the delivery of each order. The
+published problems do not limit the capacity; the benchmark sets it to 2. If a detour is quicker than the direct way,
+the travel time of the detour is used.
 """
 
 import json
@@ -80,7 +81,7 @@ def random_problem(objects: int, bins: int, seed: int) -> RoutingProblem:
 
 
 def meal_problem(orders: int, number: int) -> RoutingProblem:
-    """Return a published problem, whose distances are travel times in seconds."""
+    """Return a published meal delivery problem. Its distances are travel times in seconds."""
     triangle = json.loads(MEALS.read_text(encoding="utf-8"))[str(orders)][number]
     places = 2 * orders + 1
     times = np.zeros((places, places))

@@ -13,7 +13,7 @@ from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem
 from planner.solvers import SolveLimit, Solver, solver
 
-END = object()  # follows the last plan that a planner yields
+END = object()  # result of `OwnPlanner._next` if the custom planner yields no more plans
 CLAIM_TOLERANCE = 1e-6  # maximum relative error in the length or bound that a planner reports
 
 

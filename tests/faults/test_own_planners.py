@@ -112,7 +112,7 @@ class Own:
 
 
 def improved_by(own_module, statement, problem=PROBLEM):
-    """The lengths, bounds and proofs of the plans that a planner with these statements yields."""
+    """Return the cost, lower bound and status of each plan from a custom planner with the given statements."""
     own_module(IMPROVING.format(statement=statement))
     plans = planner_named("own_code:Own").improve(problem_from_json(json.dumps(problem)))
     return [(plan.cost, plan.lower_bound, plan.status.value) for plan in plans]

@@ -103,14 +103,14 @@ def remains(page, expression, seconds=5.0):
 
 
 def pauses(journal):
-    """The reasons of all pauses so far."""
+    """Return the reasons of all pauses in a journal."""
     entries = (entry for entry in read_entries(journal) if isinstance(entry, JournalEntry))
     events = (json.loads(line) for entry in entries for line in entry.events)
     return [event["reason"] for event in events if event["event"] == "pause"]
 
 
 def assert_stopped_for_loss(reasons):
-    """A slow page that says nothing for a second while it loses its picture has been stopped for that already."""
+    """Check that a lost picture has paused the clock. A slow page may have been paused as silent just before."""
     assert reasons
     assert reasons[0] in ("picture lost", "silent")
 
