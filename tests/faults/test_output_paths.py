@@ -24,6 +24,7 @@ def write(file, text="precious"):
 
 
 NOTES = "notes.txt"
+NO_FILM = 'phases = ["consent", "training", "task", "survey", "completion"]\n'  # of a study file
 
 
 def fill_batch(folder):
@@ -168,3 +169,15 @@ def test_a_run_that_leaves_nothing_leaves_no_folders(tmp_path):
     with pytest.raises(ZeroDivisionError), run_directory(tmp_path / "a" / "b" / "out"):
         raise ZeroDivisionError
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_study_whose_database_is_refused_leaves_no_data(mjsim, tmp_path):
+    mjsim("study", "init", "study.toml")
+    study = tmp_path / "study.toml"
+    text = study.read_text()
+    study.write_text(NO_FILM.join([text[: text.index("[study.minimum]")], text[text.index("[study.pay]") :]]))
+    end = mjsim(
+        "study", "serve", "study.toml", "--out", "out", "--port", "0", "--no-open", "--database", "me"
+    )
+    assert "is not a database URL" in one_line(end.stderr)
+    assert not list((tmp_path / "out").iterdir())

@@ -106,7 +106,6 @@ def _add_hosts(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     study = checked_study(arguments, recruits=True)
     from experiments.session.video import check_film
-    from experiments.study.data.copies import INDEX
 
     if arguments.rehearsal is not None:
         from experiments.study.rehearsal.plan import rehearsed
@@ -124,7 +123,6 @@ def run(arguments: argparse.Namespace) -> int:
             at = listen(arguments.researcher_host, arguments.researcher_port)
             researchers = stack.enter_context(at)
         stack.enter_context(locked(arguments.out))
-        (arguments.out / INDEX).touch()
         from experiments.web.server.pool import WorkerPool
 
         pool = WorkerPool(study.cells[0].trial(0).house)
@@ -144,6 +142,7 @@ async def _serve(
     import numpy as np
 
     from experiments.study.data.collect import check_people
+    from experiments.study.data.copies import INDEX
     from experiments.study.data.retention import forget_daily
     from experiments.study.plan import plan_of
     from experiments.study.researcher.app import ResearcherContext, ResearcherServer
@@ -154,6 +153,7 @@ async def _serve(
 
     store = await open_store(study, arguments, arguments.out, create=True)
     check_people(study, await store.people())
+    (arguments.out / INDEX).touch()
     folders = VisitFolders(arguments.out.absolute() / VISITS)
     procedure = Procedure(plan_of(study, film), store, folders, np.random.default_rng())
     metrics = ServerMetrics()

@@ -189,9 +189,7 @@ def test_a_page_that_was_taken_over_says_so_and_takes_back(tmp_path, chromium):
 @pytest.mark.parametrize("draw", ["auto", pytest.param("browser", marks=pytest.mark.long)])
 def test_a_lost_picture_stops_the_clock_until_it_is_back(tmp_path, chromium_page, draw):
     page = chromium_page
-    page.resize(
-        480, 270
-    )  # quickly drawn: otherwise, a page on a busy machine may let the server draw before any loss
+    page.resize(480, 270)  # drawn quickly: on a busy machine, a slow page would let the server draw
     with task(tmp_path, draw) as (server, _):
         begin(page, server.url)
         journal = server.journal(page.evaluate("location.href"), "task")
