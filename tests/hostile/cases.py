@@ -257,7 +257,9 @@ def _option(folder: Path, rng: Rng) -> Case:  # noqa: ARG001 - nothing is damage
     given = [name, value] if name and option.nargs != 0 else [name or value]
     heavy = set(words) & {"keep.txt", "nope"}
     must = REFUSED if heavy and name != "--version" else ""
-    return Case(command, f"option {option.dest}", [*words, *given], must, stdin=b"" if value != "-" else PIPE)
+    changes = "served" if command == "study erase" else ""
+    stdin = b"" if value != "-" else PIPE
+    return Case(command, f"option {option.dest}", [*words, *given], must, stdin=stdin, changes=changes)
 
 
 def _options(command: tuple[str, ...]) -> list[argparse.Action]:

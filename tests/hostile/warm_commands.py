@@ -50,7 +50,7 @@ class Case:
         call: What is called instead of the command line; an error of the library's own is a refusal.
         stdin: What standard input holds, `PIPE` or `CLOSED`.
         message: Part of the message with which it is refused.
-        changes: Files that it may replace.
+        changes: Folder whose files it may change.
     """
 
     command: str
@@ -60,7 +60,7 @@ class Case:
     call: Callable[[], Any] | None = None
     stdin: bytes | str = b""
     message: str = ""
-    changes: Sequence[str] = ()
+    changes: str = ""
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,8 @@ def _fault(case: Case, code: int, output: str, before: Mapping[str, str], after:
         return f"traceback (exit {code})"
     if UNSTABLE in output:
         return "accepted, but its physics failed"
-    if lost := [name for name in before if after.get(name) != before[name] and name not in case.changes]:
+    lost = [name for name in before if after.get(name) != before[name]]
+    if lost and not (case.changes and all(name.startswith(f"{case.changes}/") for name in lost)):
         return f"lost {lost[0]}"
     new = [name for name in after if name not in before and not (name.endswith(PREVIEW) and name in output)]
     if half := [name for name in new if _is_half(name, code, after)]:

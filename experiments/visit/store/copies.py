@@ -21,9 +21,10 @@ TAKEN = "{} is there already: name a new file for the backup."
 
 
 def check_new(path: Path) -> None:
-    """Raise StoreError if the backup file already exists."""
+    """Raise StoreError if the backup file already exists, or OSError if its folder does not."""
     if os.path.lexists(path):
         raise StoreError(TAKEN.format(path))
+    os.scandir(path.parent).close()
 
 
 async def back_up(source: Database, path: Path) -> None:

@@ -149,6 +149,7 @@ def test_a_person_is_erased_from_database_and_files_and_backups_move_the_rest(tm
     assert main(["study", "erase", *names, "p00001", "--who", "me"]) == 2, "there is nobody any more"
     assert main(["study", "backup", *names, "--out", str(study_file)]) == 2, "it is there already"
     assert main(["study", "backup", *names, "--out", str(tmp_path / "b.db"), "--database", "../.."]) == 2
+    assert main(["study", "backup", *names, "--out", str(study_file / "b.db")]) == 1, "no folder"
     assert not copies(folder), "nothing was written"
     assert main(["study", "backup", *names, "--out", str(tmp_path / "backup.db")]) == 0
     moved = tmp_path / "moved"
