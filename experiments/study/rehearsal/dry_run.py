@@ -200,7 +200,7 @@ class _Walk:
         """Take pictures of the pages for participants who return elsewhere, time out, or are not admitted."""
         store, recruiter = self._procedure.store, self._procedure.plan.recruiter
         around, person = self._around, Rehearsed(LATE)
-        ids = {name: value or f"rehearsal{LATE:06d}" for name, value in around.parameters.items()}
+        ids = around.ids(LATE)
         await SimulatedPerson(replace(next(_ways(self._procedure)), number=LATE), around, person).begin()
         changed = [ids, *({**ids, name: "elsewhere"} for name in ids)]
         key, *others = (getattr(recruiter.arrive(one), "key", None) for one in changed)
@@ -209,7 +209,7 @@ class _Walk:
             await self._photograph("returning", f"{around.base}/?{query}", "")
         await store.time_out(utc_now() + datetime.timedelta(days=1))
         await self._photograph("timed_out", f"{around.base}{person.link}", "")
-        ids = {name: value or "new" for name, value in around.parameters.items()}
+        ids = around.ids(LATE + 1)
         for name, state in (("paused", "paused"), ("full", "closed")):
             await store.set_state(cast(StudyState, state), "check")
             await self._photograph(name, f"{around.base}/?{urlencode(ids)}", "")

@@ -76,6 +76,10 @@ class Surroundings:
     def phases(self) -> dict[str, Phase]:
         return {phase.name: phase for phase in phases_of(self.plan)}
 
+    def ids(self, number: int) -> dict[str, str]:
+        """Return the query parameters in the link of a participant."""
+        return {name: value or f"rehearsal{number:06d}" for name, value in self.parameters.items()}
+
 
 class SimulatedPerson:
     """A simulated participant who visits a study according to a plan."""
@@ -89,8 +93,7 @@ class SimulatedPerson:
 
     async def begin(self) -> None:
         """Start a visit and store its link. If the participant starts twice, both links must be the same."""
-        number = self._planned.number
-        ids = {k: value or f"rehearsal{number:06d}" for k, value in self._around.parameters.items()}
+        ids = self._around.ids(self._planned.number)
         await self._around.watch("welcome", await self._get("/", ids))
         for _ in range(2 if ids and self._planned.twice else 1):
             answer = await self._post("/begin", ids)

@@ -5,6 +5,7 @@ import dataclasses
 import json
 import re
 
+import httpx
 import msgspec
 import pytest
 from scripted_workers import LAST, ScriptedPool, hello
@@ -176,10 +177,14 @@ def quick(monkeypatch):
 
 
 def _walked(study, folder, monkeypatch, phases=None):
-    pictures = []
+    """Names of the pictures of a dry run; those of a study that admits nobody map to the pages."""
+    pictures = {}
 
-    async def photograph(name, *_):
-        pictures.append(name)
+    async def photograph(name, url, _):
+        pictures[name] = ""
+        if name in ("paused", "full"):
+            async with httpx.AsyncClient() as client:
+                pictures[name] = (await client.get(url)).text
 
     if phases:
         monkeypatch.setattr("experiments.visit.procedure.phases_of", lambda _: phases)
@@ -202,7 +207,7 @@ def test_a_dry_run_goes_every_way_that_there_is(study, tmp_path, monkeypatch):
         while phase is not None:
             phases.append(phase)
             phase = more.get(phase)
-    assert pictures == [
+    assert list(pictures) == [
         "welcome", *phases, "finished", "consent-no_consent", "device-screened_out",
         "comprehension-screened_out", "withdrawal", "withdrawn", "timed_out", "paused", "full",
     ]  # fmt: skip
@@ -260,6 +265,7 @@ def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
     walked, pictures = _walked(changed, tmp_path, monkeypatch)
     assert ("returning" in pictures) is ("sites" in settings or "5f000000" in settings)
     assert [fault for fault in walked.faults if "cannot be used" not in fault] == []
+    assert "The study is paused" in pictures["paused"] and "No more participants needed" in pictures["full"]
 
 
 @pytest.mark.usefixtures("quick")
