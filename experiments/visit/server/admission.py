@@ -120,7 +120,7 @@ class Admission:
         """Return the name of the text that explains why the study is closed, or None if it is open."""
         state = (await self._store.study()).state
         if state != "open":
-            return "paused" if state == "paused" else "full"
+            return "not_open" if state == "paused" else "full"
         async with self._counting:  # concurrent requests share one database query
             if time.monotonic() > self._counted:
                 self._room = await self._procedure.room()
