@@ -142,7 +142,7 @@ def picture(result: dict[str, Any], path: Path) -> None:
 
     figure = Figure(figsize=(10, 4), layout="constrained")
     left, right = figure.subplots(1, 2)
-    draw_gaps(left, [row for row in result["summary"] if row["planner"] not in METHODS])
+    draw_gaps(left, [row for row in result["summary"] if not row["planner"].startswith(METHODS)])
     draw_proofs(right, [r for r in result["runs"] if r["planner"] == "exact"])
     for axes in (left, right):
         axes.grid(alpha=0.3)
