@@ -136,7 +136,7 @@ class House:
 
     @cached_property
     def body_geodesics(self) -> Geodesics:
-        """Shortest paths without extra distance from walls, which give lower bounds on walking distances."""
+        """Shortest paths that may touch the walls. Their lengths are lower bounds on walking distances."""
         floor = compiled_house(self.catalogue).floor
         return Geodesics(_navmesh(floor, self.person.body_radius))
 

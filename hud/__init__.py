@@ -1,4 +1,4 @@
-"""The heads-up display (HUD): assistance conditions, the HUD states that they return, and drawing functions.
+"""The heads-up display (HUD): assistance conditions, the HUD states that they produce, and drawing functions.
 
 The package depends on neither the physics simulation nor the planner.
 """

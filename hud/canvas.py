@@ -78,7 +78,7 @@ class Canvas:
         return canvas
 
     def fill(self, mask: Floats, colour: Rgb, opacity: float, x: int = 0, y: int = 0) -> None:
-        """Blend a colour onto the canvas. `mask` is the coverage from 0 to 1. The canvas clips the mask."""
+        """Blend a colour onto the canvas. `mask` is the coverage from 0 to 1. Parts beyond the canvas are ignored."""
         x0, y0 = max(x, 0), max(y, 0)
         x1, y1 = min(x + mask.shape[1], self.width), min(y + mask.shape[0], self.height)
         if x0 >= x1 or y0 >= y1:
@@ -138,7 +138,7 @@ class Canvas:
         area[3] += (1.0 - area[3]) * share
 
     def image(self, colours: Floats, opacity: Floats, x: int, y: int) -> None:
-        """Draw an image (h, w, 3), 0 to 255, with an opacity (h, w), 0 to 1. It must fit into the canvas."""
+        """Draw an image (h, w, 3) from 0 to 255 with an opacity (h, w) from 0 to 1. It must lie within the canvas."""
         area = self._planes[:, y : y + colours.shape[0], x : x + colours.shape[1]]
         area[:3] += (np.moveaxis(colours, 2, 0) - area[:3]) * opacity
         area[3] += (1.0 - area[3]) * opacity

@@ -1,4 +1,4 @@
-"""Building blocks of conditions, such as task lists in random order and flagpoles."""
+"""Building blocks of conditions, such as flagpoles and task lists in random order."""
 
 import math
 from collections.abc import Callable

@@ -28,7 +28,7 @@ class Stencil(NamedTuple):
 
 
 class Scaled(NamedTuple):
-    """A scaled picture: colours times opacity (3, s, s), and opacity (s, s), both from 0 to 1."""
+    """A scaled picture: premultiplied colours (3, s, s) and opacity (s, s), both from 0 to 1."""
 
     colours: Floats
     opacity: Floats

@@ -23,8 +23,7 @@ from planner.plan import Certificate
 from planner.problem import RoutingProblem
 
 MAX_SUM = 1 << 62  # maximum sum of lengths and multipliers, so that no sum overflows
-# Largest rounding error of a distance, relative to the largest distance. With a smaller error, the distance counts as a
-# multiple of the unit.
+# A distance counts as a multiple of the unit if the difference is at most this share of the largest distance.
 EXACT = 1e-15
 
 Whole = NDArray[np.int64]
@@ -68,7 +67,7 @@ def cuts_bound(problem: RoutingProblem, certificate: Certificate) -> float:
 
 
 def _check_cuts(certificate: Certificate, longest: int, nodes: int) -> None:
-    """Check that sums of lengths do not overflow, and that all cuts consist of known nodes without the start."""
+    """Check that sums of lengths do not overflow, and that cuts contain only known nodes, and never the start."""
     price = max(map(abs, certificate.multipliers))
     largest = longest * certificate.parts + price + sum(m for _, m, _ in certificate.cuts)
     if largest * nodes >= MAX_SUM:

@@ -14,11 +14,12 @@ from planner.plan import Certificate, Plan, Proof, Visit
 from planner.problem import RoutingProblem, make_plan, possible_next, spanning_bound, tour_length
 from planner.solvers import SolveLimit
 
-FIRST_SOLUTIONS = (1, 10)  # solution limits of the first two searches in `improve`
-DEFAULT_SOLUTIONS = 200  # default solution limit; a search takes 0.1 s for 6 objects and 2 s for 24 objects
+FIRST_SOLUTIONS = (1, 10)  # number of solutions after which the first two searches of `improve` stop
+# The same for other searches by default. A search takes 0.1 s for 6 objects and 2 s for 24 objects.
+DEFAULT_SOLUTIONS = 200
 MAX_INSERTED = 250  # maximum number of nodes for which the insertion heuristic is used
 MAX_COUNTED = 1e9  # longest time limit that OR-Tools accepts, in seconds
-MAX_SECONDS = 60.0  # time limit in seconds, in case a search does not reach its solution limit
+MAX_SECONDS = 60.0  # time limit in seconds, in case a search does not find enough solutions
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class OrToolsSolver:
     name: str = "ortools"
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """Solve a problem, up to a maximum number of solutions or seconds. The seed has no effect.
+        """Solve a problem. Stop after a number of solutions or seconds. The seed has no effect.
 
         With up to three objects, all tours are tried and the plan is OPTIMAL. With more objects, the plan's
         lower bound is the length of a spanning tree.
@@ -98,7 +99,7 @@ def _search(
     problem: RoutingProblem, distances: NDArray[np.int64], limit: SolveLimit, started: float
 ) -> list[Visit]:
     visit_of = _nodes(problem)
-    count = len(visit_of) + 1  # node 0 is both start and end; the leg back costs nothing, so the tour is open
+    count = len(visit_of) + 1  # Node 0 is start and end. The leg back costs nothing, so the tour is open.
     manager = pywrapcp.RoutingIndexManager(count, 1, 0)
     routing = pywrapcp.RoutingModel(manager)
     location = problem.stops(visit_of)

@@ -115,7 +115,7 @@ class RoutingProblem:
 
     @property
     def visits(self) -> list[Visit]:
-        """All visits that complete the task: the picks, and then the places, by object number."""
+        """All visits of the task: first the picks, then the places, each ordered by object number."""
         picks = map(self.pick, range(len(self.shipments)))
         return [*picks, *map(self.place, range(len(self.names)))]
 
@@ -221,7 +221,7 @@ def after(problem: RoutingProblem, visit: Visit) -> RoutingProblem:
 
 
 def is_for(plan: Plan, problem: RoutingProblem) -> bool:
-    """Return True if a plan was made for a problem."""
+    """Return True if `plan` is a plan for `problem`."""
     if set(plan.visits) != set(problem.visits):
         return False
     return abs(tour_length(problem, plan.visits) - plan.cost) <= SAME

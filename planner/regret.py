@@ -251,9 +251,9 @@ def _ranked(
 def _around_best(
     problem: RoutingProblem, search: TaskSearch, limit: SolveLimit | None, radius: float, plan: Plan | None
 ) -> tuple[Regret, ...]:
-    """Compute all regrets in one pass over the tours that are at most `radius` longer than a proven plan.
+    """Compute all regrets in one pass over the tours that are at most `radius` longer than the proven optimum.
 
-    If the pass is too large or there is no proven plan, the regrets are estimates.
+    If the pass is too large or no plan is proven optimal, the regrets are estimates.
     """
     if plan is None:
         plan = search.plan(problem, limit=limit)

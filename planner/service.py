@@ -86,7 +86,7 @@ class Planner:
             futures.wait([self._regrets] if self._regrets is not None else [], seconds)
 
     def ask(self, state: TaskState, *, shown: bool = True) -> bool:
-        """Update the route for the current state of the task. Return True if the plan of the route is new.
+        """Update the route for the current state of the task. Return True if a new plan was made.
 
         Args:
             state: Current state of the task.
@@ -153,7 +153,7 @@ class Planner:
         return None
 
     def finish(self) -> list[tuple[Any, RegretBounds | None]]:
-        """End the task, and return the label and the regret of each visit that `judge` has postponed.
+        """End the task, and return the label and the regret of each visit whose regret `judge` has postponed.
 
         After 0.6 s, regrets that are not proven yet are only bounded. Raises PlannerError if planning failed.
         """

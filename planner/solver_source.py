@@ -112,7 +112,7 @@ class SolverSource(PlanSource):
 
     @property
     def pending(self) -> bool:
-        """True if the background search has produced results since the last call of `better`."""
+        """True if the background search has produced results since the last call to `better`."""
         return self._search is not None and not self._search.found.empty()
 
     def better(self, state: TaskState, route: Route) -> Route | None:

@@ -70,7 +70,7 @@ def shown(value: object) -> str:
 
 
 def p_value(p: float | None) -> str:
-    """Format a p-value with three decimals. Smaller values are shown as '< .001'."""
+    """Format a p-value with three decimals. Values below .001 are shown as '< .001'."""
     return "-" if p is None else "< .001" if p < 0.001 else f"{p:.3f}".lstrip("0")
 
 

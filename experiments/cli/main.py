@@ -72,7 +72,7 @@ examples:
 
 
 def parser(*loaded: str) -> argparse.ArgumentParser:
-    """Create an argument parser for the `loaded` commands. If none are given, it only lists all commands."""
+    """Create an argument parser for the `loaded` commands. Without any, it can only list the names of all commands."""
     top = Parser(
         prog="mjsim",
         description=DESCRIPTION,

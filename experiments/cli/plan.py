@@ -175,7 +175,7 @@ class _PlanningThread(threading.Thread):
             yield self._planner.solve(self._problem, limit=limit)
 
     def wait(self) -> Plan:
-        """Return the best plan once the search has ended or timed out. Raises any error of the planner."""
+        """Wait until the search has ended or timed out, and return the best plan. Re-raise errors of the planner."""
         self.start()
         ends = float("inf") if self._seconds is None else self._since + self._seconds + GRACE_S
         report = self._since + REPORT_PERIOD_S

@@ -58,7 +58,7 @@ async def serve(
     arguments: argparse.Namespace,
     others: Sequence[tuple[Any, socket.socket]] = (),
 ) -> None:
-    """Serve an ASGI application and `others` until a signal arrives.
+    """Serve an ASGI application, and those in `others`, until a signal arrives.
 
     The URLs are printed one per line, and a browser opens the first. The applications stop in reverse order.
     """

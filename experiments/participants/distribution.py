@@ -105,7 +105,7 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
         return min(high, max(low, self._value(below + share * (above - below))))
 
     def _kind(self, share: float) -> "tuple[float | Distribution, float]":
-        """Return the mixture component that a share (0 to 1) selects, and the share within that component."""
+        """Return the mixture component at a quantile (0 to 1), and the quantile within this component."""
         kinds = [(weight, kind) for weight, kind in self.mixture or () if weight > 0]
         left = share * sum(weight for weight, _ in kinds)
         for weight, kind in kinds[:-1]:

@@ -58,7 +58,7 @@ class Frontier:
         self._left = [other for other in self._left if other is not place]
 
     def mark_seen(self, percept: Percept, room: str, within: float) -> None:
-        """Mark all viewpoints of a room that are in view and closer than `within` metres as searched."""
+        """Mark as searched all viewpoints of a room that are in view and closer than `within` metres."""
         within /= self._round  # the participant looks more closely in each new round
         walls = self._house.navmesh.outline
         self._left = [

@@ -1,4 +1,4 @@
-"""A participant who always makes the nearest possible visit, and finds objects by their flagpoles."""
+"""A participant who always goes to the nearest possible place, and finds objects by their flagpoles."""
 
 import numpy as np
 

@@ -18,7 +18,7 @@ _BUILDS = re.compile(r"^(def build\(|build = )", re.MULTILINE)
 
 @functools.cache
 def participant_names() -> tuple[str, ...]:
-    """Return the sorted names of the participants in this package, without importing them."""
+    """Return the sorted names of the participants in this package, without importing their modules."""
     folder = Path(__file__).parent
     sources = [*folder.glob("[!_]*.py"), *folder.glob("*/__init__.py")]
     found = [path for path in sources if _BUILDS.search(path.read_text(encoding="utf-8"))]

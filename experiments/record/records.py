@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 from mjsim.support.files import read_text
 
-# Additions by version: 2 state hashes, 3 physics errors, 4 typed checkpoints, 5 distances between visits,
-# ties and suggestion gaps, 6 the participant, 7 groups of person parameters
+# Version 2 added state hashes; 3 physics errors; 4 typed checkpoints; 5 distances between visits, ties and
+# suggestion gaps; 6 the participant; 7 groups of person parameters.
 LOG_FORMAT = 7
 FILES = EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "episode.json",

@@ -1,4 +1,4 @@
-"""Types of the events that concern a whole session, such as its start, its phases and its display."""
+"""Event types for the session as a whole: its start, its phases, its display and so on."""
 
 from typing import Annotated, Literal
 
@@ -200,7 +200,7 @@ class DisplayEvent(LoggedEvent, frozen=True):
 
 
 class DrawEvent(LoggedEvent, frozen=True):
-    """The view is drawn elsewhere or with another resolution.
+    """The other side now draws the view, or the browser draws it with another resolution.
 
     Attributes:
         draw: `browser` or `server`, depending on which of them draws from now on.

@@ -41,7 +41,7 @@ class CameraPath:
         return len(self.headings) * STEP
 
     def at(self, times: NDArray[np.float64]) -> "CameraPath":
-        """Return the camera path at the given times in seconds, shape (m,)."""
+        """Return the part of the camera path at the times (m,) in seconds."""
         rows = np.minimum((times / STEP).astype(np.int64), len(self.headings) - 1)
         bins = tuple(self.bins[row] for row in rows)
         return CameraPath(self.positions[rows], self.headings[rows], self.pitches[rows], bins)

@@ -1,4 +1,4 @@
-"""Describe the state of the world to assistance conditions, with labels, pictures, rooms and messages."""
+"""Collect what assistance conditions show: the state of the task, labels, pictures, rooms and messages."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -101,7 +101,7 @@ class TaskBoard:
         self._scroll = 0
 
     def scroll(self, rows: int) -> None:
-        """Scroll the task list by a number of rows, positive towards its end, until the next visit."""
+        """Scroll the task list by a number of rows, towards its end if positive. The next visit undoes this."""
         max_rows = 2 * len(self.episode.objects)
         self._scroll = min(max(self._scroll + rows, -max_rows), max_rows)
 
@@ -113,7 +113,7 @@ class TaskBoard:
         self._latest = _Shown(key, time, object_name)
 
     def announce_replan(self, time: float) -> None:
-        """Announce a new plan, made at `time` in seconds, after the minimum display time of messages."""
+        """Announce the plan that was made at `time` once the current message has been shown long enough."""
         self._replanned_at = time
 
     def view(

@@ -97,7 +97,7 @@ def is_own(code: object) -> bool:
 def make_participant(
     name: str, house: House, rng: np.random.Generator, behaviour: Mapping[str, float] | None = None
 ) -> Participant:
-    """Create a participant for a house. `behaviour` sets the parameters of the participant, if there are any.
+    """Create a participant for a house. `behaviour` contains parameters of the participant model.
 
     Raises ConfigError if the participant does not exist, and UserCodeError if a custom participant is faulty.
     """

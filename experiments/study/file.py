@@ -117,7 +117,7 @@ class StudySettings(VisitSettings, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of the study design, with one trial for each participant who is needed.
+    """A cell of the study design, with one trial for each participant that it needs.
 
     The trials take place in the houses of the design in turn, so participants of a cell spread over them evenly.
     """

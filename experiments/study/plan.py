@@ -22,7 +22,7 @@ from mjsim.generator.home_cache import load_catalogue
 
 
 def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None = None) -> VisitPlan:
-    """Create the visit plan of a study. `film` is a video of the house, and `platform` replaces the default.
+    """Create the visit plan of a study. `film` is a video of the house. `platform` replaces the study's own.
 
     Raises:
         ConfigError: A setting that the platform requires is missing.

@@ -41,7 +41,7 @@ RETRIES = 5  # number of times that a trial is rerun after losing its machine, b
 
 @dataclass(frozen=True)
 class BatchProgress:
-    """The progress of a batch, as numbers of trials. `failure` describes the last error."""
+    """The progress of a batch in numbers of trials. `failure` describes the last error."""
 
     done: int
     resumed: int

@@ -1,4 +1,4 @@
-"""Exclude participants from a study by rules about table columns or by ID (docs/analysis.md)."""
+"""Exclude participants from a study, by ID or by rules about the columns of its table (docs/analysis.md)."""
 
 import difflib
 import math

@@ -1,4 +1,4 @@
-"""Run trials on a Ray cluster whose machines share a folder. The extra `ray` installs Ray."""
+"""Run trials on a Ray cluster whose machines share a folder. `pip install 'mjsim[ray]'` installs Ray."""
 
 import functools
 import logging

@@ -80,7 +80,7 @@ class TomlFile:
 
 
 def _named(values: Mapping[str, Any], message: str) -> str:
-    """Return the first key of a table that a message names, in the singular or plural, or an empty string."""
+    """Return the first key of a table whose singular or plural occurs in a message, or an empty string."""
     keys = {key.rpartition(".")[2]: key for key in reversed(list(_keys(values)))}
     keys |= {key: key for key in _keys(values)}
     words = (form for word in _WORD.findall(message) for form in (word, f"{word}s"))

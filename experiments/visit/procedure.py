@@ -105,7 +105,7 @@ class Procedure:
             await self.store.finish_phase(now.person.id, phase, phase, answers, status=read.outcome)
 
     def refusal(self, now: PhaseState) -> Again | None:
-        """Return why the participant's last form was refused. Each refusal is returned only once."""
+        """Return the reason why the participant's last form was refused, or None. Each reason is returned only once."""
         phase, refused = self._refusals.pop(now.person.id, ("", None))
         return refused if now.phase is not None and phase == now.phase.name else None
 

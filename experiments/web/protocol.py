@@ -67,7 +67,7 @@ class Hello(WireMessage, frozen=True):
 
 
 class TakeOver(WireMessage, frozen=True):
-    """A request to continue a session that is open in another page. It answers an `occupied` message."""
+    """A request to continue a session that is open on another page. Clients send it after an `occupied` message."""
 
 
 class RunMessage(WireMessage, frozen=True, tag="run"):
@@ -117,7 +117,7 @@ class Display(WireMessage, frozen=True):
 
 
 class Draw(WireMessage, frozen=True):
-    """A notice that the browser or the server now draws the view. It is logged with its reason."""
+    """A notice that says whether the browser or the server now draws the view. It is logged with the reason."""
 
     draw: Drawer
     reason: Annotated[str, msgspec.Meta(max_length=200)]

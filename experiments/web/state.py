@@ -153,7 +153,7 @@ class Markers(WireMessage, frozen=True):
 
 
 class Pictures(WireMessage, frozen=True):
-    """Pictures to which `hud` messages refer, as data URLs by key. Each page receives them once.
+    """The pictures that `hud` messages refer to, which are sent once to each page. Keys map to data URLs.
 
     `example` has the labels of an object and its receptacle, by key. It is the same in all conditions. `markers` has
     the roles of the markers in the picture `markers`, if the study explains them and the condition shows any.

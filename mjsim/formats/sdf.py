@@ -84,7 +84,7 @@ class _WorldReader:
         )
 
     def world(self, world: ET.Element, state: SavedState) -> Iterator[ScenePiece]:
-        """Yield the pieces of all models in a world, in their saved state."""
+        """Yield the pieces of all models in a world, at the poses of a saved state."""
         at = _Place("", np.eye(4), self._path.parent, state)
         yield from self._models(world, at)
         inserted = None if state.element is None else state.element.find("insertions")

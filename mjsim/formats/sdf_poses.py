@@ -54,7 +54,7 @@ def is_true(text: str | None) -> bool:
 class SavedState:
     """The <state> of a world, or the part of it that is about one model. Its poses are relative to the world."""
 
-    path: Path  # file that error messages mention
+    path: Path  # file to name in error messages
     element: ET.Element | None = None  # a <state>, a <model> in it, or None if nothing was saved
     prefix: str = ""  # prefix of link names, if the links of a nested model are listed under the outer model
 

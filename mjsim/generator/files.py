@@ -16,7 +16,7 @@ from mjsim.support.toml import read_toml, toml_tables
 
 # Model that provides default classes, materials, categories and objects for all generated houses.
 STYLE = "houses/apartment"
-# Materials that default classes and contact shadows use in every house.
+# Materials that every house needs, because default classes and contact shadows use them.
 _ALWAYS = {"white", "ceiling", "shadow_box", "shadow_round", "shadow_edge"}
 _SHADOWS = 15.0  # range of shadows in metres; shorter ranges cause speckles on round objects
 _HEAD = """\

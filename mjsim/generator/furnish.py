@@ -211,7 +211,7 @@ class FurnishedHome:
                 _ = any(self.put(space, kind) for kind in FALLBACKS)
 
     def check(self) -> None:
-        """Find places for objects. Raise `HouseError` if they are too few, or a room has too much or no furniture."""
+        """Find places for objects. Raise `HouseError` if there are too few, or if a room is empty or too full."""
         share = sum(space.area for space in self.spaces) / self.plan.area
         if not LEAST <= share <= MOST:
             raise HouseError(f"{share:.0%} of the floor is furnished in seed {self.seed}")

@@ -89,7 +89,7 @@ def wall_stretches(room: Room, side: Side, rooms: Sequence[Room]) -> list[tuple[
 
 
 def gaps(start: float, end: float, taken: Iterable[tuple[float, float]]) -> Iterator[tuple[float, float]]:
-    """Yield the parts of an interval that none of the taken intervals covers."""
+    """Yield the parts of an interval that lie outside all `taken` intervals."""
     for low, high in sorted(taken):
         if low > start:
             yield start, low

@@ -107,7 +107,7 @@ class _RoomShell:
             yield (0.0, CEILING_HEIGHT), f"{paper}_plain" if holes else paper
 
     def _extension(self, side: Side, end: float, sign: int) -> float:
-        """Return the length by which an outer wall extends to close a corner of the house, in metres."""
+        """Return how much longer an outer wall must be to close a corner of the house, in metres."""
         edge = {"south": "y0", "north": "y1", "west": "x0", "east": "x1"}[side]
         across = getattr(self._room.floor.grown(HALF), edge)
         points = [(end + sign * 0.05, across + beyond) for beyond in (-0.05, 0.05)]

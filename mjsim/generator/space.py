@@ -18,7 +18,7 @@ from mjsim.generator.values import SIDES, HomePlan, Room, Side
 
 # Lengths are in metres.
 BODY = 0.36  # body radius that must fit through all walkways
-# Body radii with clearance. A body of each radius must be able to reach every part of the floor where it has room.
+# Body radii including clearance. For each radius, the floor on which such a body fits must be connected.
 PERSON_RADII = (0.25, 0.265, 0.28, 0.29, 0.3)
 POCKET = 0.005  # maximum area of unreachable floor that is tolerated, in square metres
 BESIDE = 0.6  # width of the floor next to a door that bins should avoid

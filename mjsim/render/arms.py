@@ -1,4 +1,4 @@
-"""The arms of the person in pictures: sleeves from hand to shoulder, and idle hands that hang at rest."""
+"""Draw the person's arms: sleeves from the hands to the shoulders, and the posture of empty hands."""
 
 from typing import Any, NamedTuple
 
@@ -42,7 +42,7 @@ class Arms:
 
     @property
     def sleeves(self) -> list[int]:
-        """The geoms whose length changes from picture to picture."""
+        """The geoms whose lengths differ between frames."""
         return [arm.sleeve for arm in self._arms]
 
     def pose(

@@ -67,7 +67,7 @@ class ContactShadows:
         self, scene: Any, centre: NDArray[np.float64], half: NDArray[np.float64], strength: float
     ) -> None:
         rgba = (self._rgba * [1.0, 1.0, 1.0, strength]).astype(np.float32)
-        # MuJoCo draws translucent planes such as rugs before other translucent geoms, so the spot is a box.
+        # Rugs are translucent planes, which MuJoCo draws before other translucent geoms. So the shadow is no plane.
         box = mujoco.mjtGeom.mjGEOM_BOX
         geom = add_decorative_geom(scene, box, np.array([*half, _THICKNESS]), centre, rgba)
         geom.matid, geom.texcoord = self._material, 0

@@ -14,7 +14,7 @@ TIME_TOLERANCE = 1e-6  # tolerance for comparing simulated times, in seconds
 
 @dataclass(frozen=True)
 class Move:
-    """An action that walks, turns and looks for one control step, with velocities in the body frame.
+    """An action that moves the body and the head for one control step. Velocities are in the body frame.
 
     Attributes:
         forward: Velocity along the heading, in m/s.

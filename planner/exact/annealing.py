@@ -9,7 +9,7 @@ from planner.exact.moves import NOTHING, NOWHERE, Moves
 from planner.exact.table import INFINITE
 from planner.solvers import NEVER, Deadline
 
-Ways = dict[int, tuple[int, list[int]]]  # length and actions of a shortest known way to each place
+Ways = dict[int, tuple[int, list[int]]]  # length and actions of the shortest known way to each place
 SLICE = 10_000  # number of moves between two checks of the deadline, which takes about 15 ms
 
 

@@ -25,10 +25,10 @@ NOTHING = (
 
 
 class Moves(NamedTuple):
-    """Ends and lengths of the moves from each place. A move can end in two ways, of which one may be `NOWHERE`.
+    """Ends and lengths of the moves from each place. A move has up to two possible ends. The others are `NOWHERE`.
 
     The moves with index `NOTHING` go to a bin and place all objects of this bin. Only at the root can there be two such
-    bins. The two ways to pick up a second object place the first one and the second one, respectively.
+    bins. If a second object is picked up, the first end places the first object, and the second end the second.
     """
 
     bins: int  # number of bins

@@ -29,7 +29,7 @@ class Ascent(NamedTuple):
     current: NDArray[np.float64]  # current multipliers, shape (n,)
     direction: NDArray[np.float64]  # last change of the multipliers, shape (n,)
     violation: NDArray[np.float64]  # average violation, as in `Bound`, shape (n,)
-    best: NDArray[np.int64]  # multipliers with the best bound, shape (n,)
+    best: NDArray[np.int64]  # multipliers that gave the best bound so far, shape (n,)
     sizes: NDArray[np.float64]  # length of each step relative to the gap, shape (steps,)
     progress: NDArray[np.int64]  # number of steps, and best bound
 
@@ -165,7 +165,7 @@ def fit(
 
 @kernel
 def climb(inst: Instance, table: CostTable, ascent: Ascent, upper: int, rows: int) -> bool:
-    """Continue a subgradient ascent until `rows` table rows are filled. Return True if it is finished.
+    """Continue a subgradient ascent until `rows` table rows are filled. Return True if the ascent is finished.
 
     At the end, the table contains the best multipliers and the corresponding entries. The ascent is a single
     kernel because a return to Python after each table would require waiting for the interpreter lock.

@@ -62,7 +62,7 @@ class CostTable(NamedTuple):
 
 @dataclass(frozen=True)
 class Solution:
-    """A tour, and a lower bound on tour lengths with its proof."""
+    """A tour, a lower bound on the lengths of all tours, and a certificate of the bound."""
 
     # Action k >= 0 picks up object k. Action -1 - b goes to bin b and places all objects that belong there.
     actions: list[int]

@@ -92,7 +92,7 @@ class TaskSearch:
         limit: SolveLimit | None = None,
         before: tuple[RoutingProblem, Plan] | None = None,
     ) -> Plan:
-        """Return the best plan within the share of this problem, to which the solver must apply.
+        """Return the best plan that this problem's share of the budget allows. The solver must apply to the problem.
 
         `before` is the problem of an earlier state of the same task and its plan.
         """

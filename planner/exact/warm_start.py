@@ -28,7 +28,8 @@ class WarmStart:
     """The results of earlier plans, in which objects are identified by name."""
 
     multipliers: Mapping[str, float]  # price of picking up each object in the relaxation, in metres
-    groups: tuple[tuple[str, ...], ...] = ()  # groups of objects that the relaxation counts together
+    # Groups of objects, of which the relaxation knows only how many remain
+    groups: tuple[tuple[str, ...], ...] = ()
     order: tuple[str, ...] = ()  # object names in the order in which a good tour picks them up
 
     def updated(self, problem: RoutingProblem, plan: Plan) -> "WarmStart":

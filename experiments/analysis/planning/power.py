@@ -50,7 +50,7 @@ class StudyCost:
                 )
 
     def total(self, people: int) -> float:
-        """Return the total cost of a study that `people` participants finish."""
+        """Return the total cost of a study if `people` participants finish it."""
         return people * self.pay * (1 + self.fee)
 
     def hours(self, people: int) -> float:

@@ -18,7 +18,7 @@ from experiments.errors import StatisticsError
 
 MAX_KINDS = 3
 MIN_PEOPLE = 10
-PRECISIONS = (0.0, 7.0)  # limits of log(a + b); at the upper limit, participants of a type are nearly equal
+PRECISIONS = (0.0, 7.0)  # bounds on log(a + b); at the upper bound, people of the same type hardly differ
 STARTS = 10  # number of random starting points, in addition to those computed from the data
 
 Counts = NDArray[np.int64]

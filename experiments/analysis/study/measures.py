@@ -87,7 +87,7 @@ class Measures(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def read_measures(path: Path = FILE) -> Measures:
-    """Read a measures file, by default the one of the paper. Raises `ConfigError` if it is invalid."""
+    """Read a measures file, by default the one with the paper's measures. Raises `ConfigError` if it is invalid."""
     try:
         return decoded_measures(read_bytes(path))
     except OSError as error:

@@ -99,7 +99,7 @@ class StudyTable:
         return {c: v for c, v in found.items() if len(v)}
 
     def visits(self) -> NDArray[np.int64]:
-        """Return the number of visits per trial. Unknown numbers are computed from the numbers of objects."""
+        """Return the number of visits per trial. Where it is not recorded, it follows from the number of objects."""
         found = []
         for row, usual in zip(self.rows, (2 * self.objects).tolist(), strict=True):
             made, finished = row.get("visits"), row.get("ended", ALL_DELIVERED) == ALL_DELIVERED

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from experiments.study.rehearsal.run import RehearsalSettings
 
 MAX_FAULTS_SHOWN = 20
-POSITIVE = 0.001, 1_000_000  # smallest and largest value of options that must be above 0
+POSITIVE = 0.001, 1_000_000  # smallest and largest values of options that must be above 0
 DESCRIPTION = """\
 Rehearse a whole study with simulated participants. They use the real server (OUT/served), with pages by HTTP and trials
 by WebSocket. They arrive and answer at random, leave, return, reload, lose the connection, and submit forms twice.

@@ -94,7 +94,7 @@ def judged_distances(
 
 
 def choose(costs: Sequence[float], temperature: float, rng: np.random.Generator) -> int:
-    """Choose an option with odds exp(-cost / temperature), both in metres.
+    """Choose an option with a probability proportional to exp(-cost / temperature), both in metres.
 
     At temperature 0, choose the cheapest. An option with an infinite cost is never chosen.
     """
@@ -204,7 +204,7 @@ class Timing:
         return self.pace * rows * self.words / self.reading_speed * 60.0
 
     def choice_time(self, *, poles: bool) -> float:
-        """Return the time in seconds to choose the next visit and, with `poles`, to interpret flagpoles."""
+        """Return how long it takes to choose the next visit, in seconds. With `poles`, flagpoles have to be read."""
         return self.pace * (self.deciding + (self.interpreting if poles else 0.0))
 
     def suggestion_time(self) -> float:

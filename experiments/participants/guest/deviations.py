@@ -61,7 +61,7 @@ class Adherence:
 
 @dataclass(frozen=True)
 class Walking:
-    """Parameters of deviations from the shortest path. Shapes of distributions are starting values."""
+    """Parameters of deviations from the shortest path. The shapes of their distributions were not fitted."""
 
     # probability that a walk without a shown path starts with a detour by mistake
     lapse_rate: float = chance({"beta": [0.5, 3.0]})

@@ -232,7 +232,7 @@ class Guest:
         return self._house.approaches[percept.targets[aim.object]]
 
     def _turn_around(self, percept: Percept) -> Action | None:
-        """Continue a turn. After a full turn, the guest knows all bins of the room."""
+        """Keep turning. After a full turn, the guest knows all bins in the room."""
         turning = self._turn.act(percept) if self._turn is not None else None
         if turning is None and self._turn is not None:
             self._turn = None

@@ -85,7 +85,7 @@ async def collect(study: Study, store: Store, folder: Path) -> Collected:
 
 
 def survey_of(study: Study) -> SurveyScale:
-    """Return the scale of a study's survey, and the items that are answered on it."""
+    """Return the items of a study's survey that have a rating scale, and the number of points on this scale."""
     section = study.texts[SURVEY]
     return SurveyScale(
         len(section.scale), {item.name: item.text for item in section.items if item.kind == "scale"}
@@ -109,7 +109,7 @@ def check_people(study: Study, people: Sequence[PersonRow]) -> None:
 
 
 def collect_visits(folder: Path) -> Collected:
-    """Collect the finished tasks in an output folder of `mjsim play`. Personal links are not included."""
+    """Read the finished tasks from an output folder of `mjsim play`, but no personal links."""
     rows: list[Mapping[str, Any]] = []
     unusable: dict[str, str] = {}
     visits = list(visit_folders(folder))

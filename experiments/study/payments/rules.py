@@ -31,7 +31,7 @@ class Due:
 def due(
     study: Study, people: Sequence[PersonRow], trials: Sequence[TrialRow], rejected: Collection[int] = ()
 ) -> list[Due]:
-    """Return all payments that are due by the rules of the study, in the order in which participants arrived.
+    """Return the payments that the rules of the study require, in the order in which participants arrived.
 
     Active and rejected participants receive no payments.
     """

@@ -107,7 +107,7 @@ class Cost:
 
     @property
     def total(self) -> float:
-        """The maximum cost, without payments to screened-out participants."""
+        """The maximum cost, excluding payments to screened-out participants."""
         return self.rewards + self.bonuses + (self.fee or 0.0)
 
 

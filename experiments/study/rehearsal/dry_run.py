@@ -38,7 +38,7 @@ from experiments.visit.tokens import token_hash
 from experiments.web.server.limit import SessionLimit
 from experiments.web.server.pool import WorkerPool
 
-MINIMUM_S = 1.0  # longest minimum duration of a phase in a dry run, in seconds
+MINIMUM_S = 1.0  # minimum durations of phases are at most this long in a dry run, in seconds
 TASK_S = 1.0
 PLACES = 10  # factor by which the trials of a cell are repeated so that no participant is turned away
 FACTOR = 1e6  # factor by which reading times are divided

@@ -132,7 +132,7 @@ class Link:
 async def connected(
     base: str, path: str, trial: str, tab: str, player: SimulatedPlayer
 ) -> AsyncIterator[Link]:
-    """Connect to a trial in the same way as a web page, and disconnect at the end of the block."""
+    """Connect to a trial as a web page does, and disconnect at the end of the block."""
     url, origin = f"ws{base.removeprefix('http')}{path}", cast("Origin", base)
     async with connect(url, origin=origin, max_size=None) as socket:
         link = Link(socket, player)

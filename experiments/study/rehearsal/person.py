@@ -69,7 +69,7 @@ class Surroundings:
     home: Callable[[str], House]  # loads the house of the participant with a link
     parameters: Mapping[str, str]  # query parameters of the platform's links, with empty ids
     factor: float  # factor by which waiting times are divided
-    hasty: bool = False  # True to submit forms too early as well, which the server must refuse
+    hasty: bool = False  # True to submit each form too early first, to check that the server refuses it
     watch: Watch = _ignore  # called with the name of each page and the server's response
 
     @functools.cached_property
@@ -82,7 +82,7 @@ class Surroundings:
 
 
 class SimulatedPerson:
-    """A simulated participant who visits a study according to a plan."""
+    """A simulated participant who goes through a study according to a `Planned` visit."""
 
     def __init__(self, planned: Planned, around: Surroundings, rehearsed: Rehearsed) -> None:
         self._planned, self._around, self.rehearsed = planned, around, rehearsed
@@ -153,7 +153,7 @@ class SimulatedPerson:
             self._fault(f"the page says {page.status_code}")
             return "stuck"
         how = self._planned.leaves
-        # If a trial ends before the participant can leave as planned, the participant finishes the visit.
+        # A participant who was to leave during a trial stays to the end of the visit if the trial ends first.
         return how if how in ("refuses", "fails", "gives up") else "finished"
 
     async def _fill(self, phase: Phase, leaves: str | None, tries: int) -> None:
@@ -281,7 +281,7 @@ def form_of(phase: Phase, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def wrong_form(phase: Phase, form: dict[str, Any]) -> dict[str, Any] | None:
-    """Return a form that the phase must refuse, or None if the phase accepts every form.
+    """Return a form that the phase must refuse, or None if every form is valid.
 
     If a question has a right answer, the form contains a wrong answer. Otherwise, all answers are missing.
     """

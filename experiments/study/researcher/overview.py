@@ -50,7 +50,7 @@ def _frames(found: Sequence[float]) -> Mapping[str, float] | None:
 
 
 def _payments(history: Sequence[PaymentEvent]) -> Iterator[Mapping[str, Any]]:
-    """Summarize the payments by type and currency. Amounts are in hundredths of the currency."""
+    """Summarize the payments by type and currency. Amounts are in hundredths of the currency unit."""
     payments = by_key(history).values()
     for kind, currency in sorted({(events[0].kind, events[0].currency) for events in payments}):
         mine = [events for events in payments if (events[0].kind, events[0].currency) == (kind, currency)]

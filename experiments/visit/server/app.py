@@ -252,5 +252,5 @@ class VisitServer:
         return person
 
     def _lock(self, person: PersonRow) -> asyncio.Lock:
-        """Return a lock that prevents concurrent requests of a participant from changing the phase."""
+        """Return the lock that a request holds while it changes the phase of a participant."""
         return self._locks.setdefault(person.token_hash, asyncio.Lock())

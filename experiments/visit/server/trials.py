@@ -116,7 +116,7 @@ class Trials:
                 await beating
 
     def _has_room(self, participant: str, address: str) -> bool:
-        # All participants may share one address. A page that is reloaded briefly has two WebSockets.
+        # All participants may share one IP address. While a page reloads, it briefly has two WebSockets.
         playing = max(self._limit.count, len(self._limit.held))
         from_address = max(SOCKETS_OF_AN_ADDRESS, SOCKETS_OF_A_PERSON * playing)
         return self._sockets[participant] < SOCKETS_OF_A_PERSON and self._sockets[address] < from_address

@@ -52,7 +52,7 @@ _HOLDERS = (
 
 
 class Assignments(StorePart):
-    """Store methods that assign participants to the cells of the design."""
+    """The part of the store that assigns participants to the cells of the design."""
 
     @transaction
     async def assign(

@@ -103,7 +103,7 @@ class WorkerPool:
             await asyncio.sleep(RETRY)
 
     def discard(self, worker: WorkerProcess) -> None:
-        """End a worker in the background."""
+        """End a worker without waiting for it."""
         ending = asyncio.ensure_future(asyncio.to_thread(worker.end))
         self._ending.add(ending)
         ending.add_done_callback(self._ending.discard)

@@ -30,7 +30,7 @@ PLAN, VIEW = (480, 400), (300, 200)  # width and height of the floor plan and of
 PAGE, ABOUT = "index.html", "home.json"
 INTERVAL = 0.2  # interval between poses of the tour, in seconds; the page interpolates between them
 NEAR = 0.05  # distance at which a viewpoint counts as reached, in metres
-INSIDE = (0.0, 0.0, 0.8) * 2  # positions of both hands in metres, which hide them inside the body
+INSIDE = (0.0, 0.0, 0.8) * 2  # positions of both hands inside the body, where they are hidden, in metres
 _HUD = HudState("", (), (), (None, InventorySlot()))
 
 

@@ -1,4 +1,4 @@
-"""The clock of a session. It runs 25 control steps per second and acknowledges steps that are on disk."""
+"""The clock of a session. It runs 25 control steps per second and acknowledges each step once it is on disk."""
 
 import time
 from collections.abc import Callable

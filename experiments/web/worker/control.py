@@ -13,7 +13,7 @@ from experiments.web.protocol import MAX_SILENCE
 from experiments.web.state import PAUSED, READY, RUNNING, SessionPhase, State, Trigger
 
 MAX_NOTES = 1000  # maximum number of queued log events
-MAX_PROMISES = 64  # maximum number of stored promises
+MAX_PROMISES = 64  # maximum number of stored promises of a client (see `Inputs`)
 Note = tuple[str, dict[str, Any]]  # name and fields of a log event
 
 

@@ -75,7 +75,7 @@ def data_url(picture: Image) -> str:
 
 def poster(film: Path) -> str:
     """Return the most detailed key frame of a film as a data URL, or an empty text if the film cannot be read."""
-    # Errors of FFmpeg are OSErrors or ValueErrors
+    # FFmpeg's errors are OSErrors or ValueErrors
     with suppress(OSError, ValueError, IndexError), film.open("rb") as file, av.open(file) as container:
         stream = container.streams.video[0]
         keys = [packet for packet in container.demux(stream) if packet.is_keyframe]

@@ -44,7 +44,7 @@ def encoded_pictures(name: str, floor_plan: bool) -> dict[str, str]:
 
 
 def shown_pictures(config: TrialConfig, shown: House, *, explained: bool = False) -> Pictures:
-    """Return the pictures of a trial's house, with labels in its language. This requires OpenGL.
+    """Return the pictures of a trial's house, with labels in the language of the trial. This requires OpenGL.
 
     If the markers are to be `explained`, one picture shows those of the trial's condition.
     """

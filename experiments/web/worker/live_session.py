@@ -84,7 +84,7 @@ class BrowserParticipant:
 
 
 class LiveSession:
-    """A live session of a trial. It continues after the last control step in its journal.
+    """A live session of a trial. If its journal contains control steps, it continues after the last one.
 
     Args:
         journal: Journal of all control steps. If it is empty, `config` is written first.

@@ -36,7 +36,7 @@ class MarkerPicture(msgspec.Struct, frozen=True):
 
 
 def marker_picture(house: House, trial: TrialConfig) -> MarkerPicture:
-    """Return an example of the markers of a trial's condition.
+    """Return a picture of example markers in the condition of a trial.
 
     It is drawn once per condition and house, and then read from the cache.
 
@@ -63,7 +63,7 @@ def marker_picture(house: House, trial: TrialConfig) -> MarkerPicture:
 
 
 def _scripted(house: House, episode: Episode) -> Episode:
-    """Return an episode with one object, which is ahead of a person in a corner of the largest room."""
+    """Return an episode with one object. The person stands in a corner of the largest room and sees the object."""
     (room,) = largest_rooms(house, 1)
     found: list[tuple[float, StartPose, PlacedObject]] = []
     for view in room_views(house, [room])[room]:

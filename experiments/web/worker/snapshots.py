@@ -14,7 +14,7 @@ from mjsim.values.observation import Observation
 from mjsim.world.fidelity import kinematics
 
 LOG = logging.getLogger("mjsim.play")
-HORIZON = 0.3  # lead time with which objects are sent before they come into view, in seconds
+HORIZON = 0.3  # objects are sent this long before they may come into view, in seconds
 LINGERING = 25  # number of control steps for which objects are still sent after they leave the view
 LOOK_EVERY = 3  # number of control steps between updates of the set of objects to send
 DECIMALS = 4  # number of decimal places of positions in metres and of quaternions

@@ -175,7 +175,7 @@ class BrowserViewer(Viewer):
 
 
 def page_hud(state: HudState) -> Hud:
-    """Return the state of the HUD without the markers and the values in `Moment` messages."""
+    """Return the state of the HUD without markers and without what `Moment` messages contain."""
     message = state.message
     if message is not None:
         message = dataclasses.replace(message, opacity=1.0) if message.opacity > 0.0 else None

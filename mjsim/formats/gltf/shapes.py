@@ -113,7 +113,7 @@ def _quad() -> Shape:
 
 
 def _plane(size: Floats, far: float) -> Shape:
-    """Return a plane with the given half sizes. A half size of 0 means infinite and is drawn up to `far`."""
+    """Return a plane with the given half sizes. Where a half size is 0, the plane is infinite and drawn up to `far`."""
     shape = _quad()
     endless = size[:2] <= 0.0
     half = np.where(endless, far, size[:2])

@@ -1,4 +1,4 @@
-"""Paths of scene files on disk. This module is separate from the writers because it is fast to import."""
+"""Paths of scene files on disk. This module is separate from the writers so that its import is fast."""
 
 from pathlib import Path
 

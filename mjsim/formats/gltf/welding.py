@@ -1,4 +1,4 @@
-"""Close T-junctions between boxes, such as the stretches of a wall above and next to a door.
+"""Close T-junctions between boxes, for example between the parts of a wall above and beside a door.
 
 Where a corner of one box is on an edge of another box, rounding in a rasteriser leaves gaps of single pixels.
 The edge therefore gets a vertex there as well.

@@ -21,7 +21,8 @@ from mjsim.generator.values import WALL
 from mjsim.support.files import read_json, read_text
 from mjsim.values.errors import AssetError, brief
 
-# Metadata key of exported houses for a mapping from room ids to [key, label]. ProcTHOR has only four room types.
+# Metadata key of a mapping from room ids to [key, label], which exported houses contain because ProcTHOR has only four
+# room types.
 NAMES = "mjsim_rooms"
 # Names of room types that are not written in camel case.
 _TYPES = {"livingroom": "living_room"}

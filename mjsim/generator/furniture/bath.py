@@ -104,7 +104,7 @@ def bathtub(b: Builder) -> Piece:
     b.rod("chrome", (x, d / 2, 0.72), (x - side * 0.14, d / 2, 0.7), 0.018)
     b.post("chrome", x, d / 2, (h, 0.74), 0.015)
     parts = [(-w / 2, 0.0, w / 2, d, 0.62)]
-    high = 0.0  # length of the part with a shower or screen, from the taps, in metres
+    high = 0.0  # length of the part of the tub with a shower or a screen, measured from the taps, in metres
     if b.smaller < 2 and b.chance(0.6):
         high = 0.4
         b.post("chrome", x, d / 2, (0.74, 2.05), 0.011)

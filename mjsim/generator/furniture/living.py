@@ -8,7 +8,7 @@ from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.piece import Piece, group, pushed_in
 
 FREE = 1.2  # minimum depth of the free floor between a television and the seats, in metres
-VIEW = 3.4  # maximum distance between the fronts of a television and of the seats, in metres
+VIEW = 3.4  # maximum distance from the front of a television to the front of the seats, in metres
 OFF_GRID = 0.0005  # offset of a rug's edges from the faces of legs, which would flicker with them, in metres
 
 

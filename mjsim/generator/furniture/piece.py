@@ -87,7 +87,7 @@ class Piece:
     size: tuple[float, float, float]  # width along the wall, depth into the room and height, in metres
     geoms: str  # MJCF elements in the frame of the piece
     parts: tuple[Obstacle, ...]
-    use: tuple[Spot, ...] = ()  # free floor that people need to use the piece
+    use: tuple[Spot, ...] = ()  # floor that must stay free so that people can use the piece
     # Position of the piece: "wall", "left", "right", "free", "hangs", "flat", "recess" or "ceiling".
     # Pieces with "left" or "right" stand at a wall, with that end in a corner of the room.
     stands: str = "wall"
@@ -95,7 +95,7 @@ class Piece:
     mounts: tuple[Mount, ...] = ()
     pictures: tuple[DrawnTexture, ...] = ()
     places: tuple[Point, ...] = ()  # free positions on top of the piece where objects can lie, in metres
-    members: tuple["Member", ...] = ()  # members of a group; a group has no geoms
+    members: tuple["Member", ...] = ()  # pieces of a group, which has no geoms of its own
 
     @property
     def reached(self) -> list[Spot]:

@@ -88,7 +88,7 @@ def dining(b: Builder) -> Piece:
     base = b.draw(kind, b.smaller)
     w, d, _ = base.size
     chair = _seat(b, seats.dining_chair)
-    # For each seat, the middle of its edge of the table, and the yaw of a person who sits there
+    # For each seat, the middle of the table edge in front of it, and the yaw of a person who sits there
     edges = []
     each = 2 if w >= 1.15 and b.smaller < 2 and kind is table else 1
     for i in range(each):

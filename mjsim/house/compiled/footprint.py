@@ -15,7 +15,7 @@ from mjsim.house.compiled.sites import RoomMap
 from mjsim.support.kernels import kernel
 from mjsim.values.errors import AssetError
 
-CIRCLE_SIDES = 32  # number of sides of a polygon around a circle; it is up to 0.5 % wider than the circle
+CIRCLE_SIDES = 32  # number of sides of the polygon around a circle, which is at most 0.5 % wider
 _GEOM = mujoco.mjtGeom
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _ANGLES = 2 * np.pi * (np.arange(CIRCLE_SIDES) + 0.5) / CIRCLE_SIDES

@@ -44,7 +44,7 @@ class NavigablePoints(Protocol):
 
 
 class NavigableFloor(NavigablePoints, Protocol):
-    """Protocol of a walkable floor that also provides a map of its regions."""
+    """Protocol for walkable floors that also provide a map of their regions."""
 
     @property
     def topdown_map(self) -> NDArray[np.int32]:

@@ -32,7 +32,8 @@ DROPS = 8
 MAX_POINTS = 1000
 LEAST_VIEW = 0.6  # minimum distance between the start position and a wall ahead, in metres
 CHEST = 1.2  # height at which the view ahead must be free, in metres
-HEADINGS = 16  # number of headings among which a start that faces a wall takes the one with the longest view
+# Number of headings. If the person would start facing a wall, the one with the longest view is used instead.
+HEADINGS = 16
 RADIUS_STEP, RADII, DRAWS_PER_RADIUS = 0.25, 80, 32
 
 
@@ -130,7 +131,7 @@ def house_points(
 
 
 def _places_on_furniture(house: CompiledHouse, points: int, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Draw the places on furniture (k, 3) among `points` points, in metres. The other points are on the floor."""
+    """Choose random places on furniture for some of `points` objects, in metres, shape (k, 3)."""
     if not len(house.places):
         return house.places
     return house.places[rng.permutation(len(house.places))[: math.floor((1 - FLOOR_SHARE) * points)]]
@@ -148,7 +149,7 @@ def sample_points(
     count: int,
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
-    """Draw walkable points (count, 2) that are far from each other and from `keep_away` (k, 2), in metres."""
+    """Return random walkable points (count, 2) far from each other and from `keep_away` (k, 2), in metres."""
     found: list[int] = []
     for _ in range(PACKINGS):
         points = _pack(navigable, keep_away, count, rng)

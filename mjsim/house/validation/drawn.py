@@ -15,7 +15,7 @@ from mjsim.house.validation.checked_model import Compiled
 SLACK = 0.004  # depth by which drawn bodies may overlap, such as table legs on a rug, in metres
 FLUSH = 0.0003  # maximum distance between two faces that flicker, in metres
 FLICKER = 1e-4  # area of two coinciding faces above which people see them flicker, in m^2
-EYES = (1.0, 2.0)  # range of the heights of people's eyes in metres
+EYES = (1.0, 2.0)  # range of people's eye heights in metres
 GAP = 0.02  # width of a gap that hides the faces in it, in metres
 SHELL = ("structure", "world", "floors")  # last parts of the names of bodies that form walls and floors
 _SAMPLES = np.linspace(-0.45, 0.45, 3)  # positions on a face, relative to its size

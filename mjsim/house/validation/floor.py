@@ -81,7 +81,7 @@ class WalkableFloor:
         return found
 
     def cell_of(self, points: NDArray[np.float64]) -> NDArray[np.intp]:
-        """Return the indices of the cells nearest to points (..., 2) in metres, shape (..., 2)."""
+        """Return the indices (..., 2) of the cells that are nearest to points (..., 2) in metres."""
         field = self.clearance
         cells = np.rint((points - [field.origin_x, field.origin_y]) / field.resolution).astype(np.intp)
         return np.clip(cells, 0, np.array(field.distance.shape) - 1)

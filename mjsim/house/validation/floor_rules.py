@@ -148,7 +148,7 @@ def _level(floor: WalkableFloor) -> Iterator[Finding]:
 
 
 def _headroom(floor: WalkableFloor) -> Iterator[Finding]:
-    """Check that nothing hangs at eye height, except for obstacles that reach below 1.8 m."""
+    """Check that nothing hangs lower than the eyes of tall people wherever they can walk."""
     points = _places(floor)
     heights = np.array([_CHEST + _free(floor.compiled, p, 1.0) for p in points])
     low = int(heights.argmin())

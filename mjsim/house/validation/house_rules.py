@@ -76,7 +76,7 @@ def _is_free(compiled: Compiled, geom: int, place: NDArray[np.float64]) -> bool:
 
 
 def _to_mesh(compiled: Compiled, geom: int, start: NDArray[np.float64], up: float) -> float:
-    """Return the vertical distance from a point (3,) up (1) or down (-1) to a mesh, or -1 for a miss."""
+    """Return the distance from a point to a mesh above it, or below it if `up` is -1. Return -1 if there is none."""
     return float(mujoco.mj_rayMesh(compiled.model, compiled.data, geom, start, np.array([0.0, 0.0, up])))
 
 

@@ -25,7 +25,7 @@ SLOTS = 2.5  # minimum number of average-sized objects that must fit side by sid
 
 
 def require_usable(house: CompiledHouse) -> None:
-    """Check a house and raise an AssetError with the first error. Houses of this package are not checked.
+    """Raise an AssetError if a house has an error. Houses that come with this package are not checked.
 
     A process checks each house only once. For a generated house, a file in the cache records that the current
     code has accepted it, so that later processes do not check it again.

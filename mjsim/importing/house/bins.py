@@ -18,8 +18,8 @@ from mjsim.importing.house.rooms import Rooms
 from mjsim.values.errors import AssetError
 
 AREA = 5.0  # walkable floor area that is required for each bin, in square metres
-_STAND = 0.8  # depth of the free floor that is required in front of a bin, in metres
-_ASIDE = 0.05  # width of the free floor on each side of a bin, in metres
+_STAND = 0.8  # depth of the floor that must be free in front of a bin, in metres
+_ASIDE = 0.05  # width of the floor that must be free on each side of a bin, in metres
 _WALL = 0.15  # maximum distance between a bin and the wall behind it, in metres
 _WIDE = 0.4  # radius of a body that can still reach all of the floor once the bins are placed, in metres
 _TRIES = 300  # maximum number of poses that are tried for a bin in each room
@@ -144,7 +144,7 @@ def _choices(grid: FloorGrid, room: Mask, size: Floats, rng: np.random.Generator
 
 
 def _beyond(span: Span, way: int, cells: int) -> Span:
-    """Return `cells` cells after the span (`way` is 1) or before it (-1), or the span itself (0).
+    """Return the span itself if `way` is 0, or a number of `cells` after it (1) or before it (-1).
 
     If `cells` is negative, return the cells at that end of the span.
     """
@@ -193,7 +193,7 @@ def _origin(grid: FloorGrid, base: Floats, choice: _Choice) -> tuple[float, floa
 
 
 def _count(mask: Mask, spans: Sequence[Span]) -> NDArray[np.int_]:
-    """For each cell, count the cells of `mask` in a rectangle. The spans are the rectangle relative to the cell."""
+    """Return the number of true cells of `mask` in a rectangle around each cell, whose ends are in `spans`."""
     total = np.pad(np.cumsum(np.cumsum(mask, axis=0), axis=1), ((1, 0), (1, 0)))
     (a, b), (c, d) = (
         [np.clip(np.arange(side) + end, 0, side) for end in span]

@@ -1,4 +1,4 @@
-"""Warn about imported houses that are probably not the house that the source shows, or too small for a study."""
+"""Warn about imported houses that probably differ from the original, or that are too small for a study."""
 
 from collections.abc import Iterator
 

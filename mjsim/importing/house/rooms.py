@@ -126,7 +126,7 @@ def find_rooms(grid: FloorGrid, given: Sequence[NamedRoom], pieces: Sequence[Sce
     numbered[kept] = np.arange(1, len(kept) + 1)
     floor = _grown(numbered[seeds], region)
     labels = floor
-    for _ in range(2):  # extend the rooms into their walls
+    for _ in range(2):  # rooms include two cells of their walls
         labels = np.where(labels == 0, _spread(labels, cv2.MORPH_RECT), labels)
     given_names = [(given[n - 1].key, given[n - 1].label) for n in kept if given]
     names = given_names or _names(labels, len(kept), grid, pieces)

@@ -30,7 +30,7 @@ _OVERHEAD = 0.8
 _FURNITURE = 1.5  # Closed meshes up to this side length, in metres, count as solid furniture.
 _ROOM = (2.0, 2.0, 1.8)  # size in metres above which a closed mesh is a hollow room, not a block
 _FEW = 30  # maximum number of voxel boxes in a piece of furniture
-_MAX_PARTS = 4000  # maximum number of connected bodies of a piece that are processed individually
+_MAX_PARTS = 4000  # maximum number of separate parts into which a piece is divided
 _THIN = 0.01  # minimum thickness of colliding geoms, in metres
 
 
@@ -64,7 +64,7 @@ class Solids:
 
 
 def make_solids(pieces: Iterable[ScenePiece]) -> Solids:
-    """Create the collision shapes of all solid pieces of a scene at the height of a person."""
+    """Create the collision shapes of all solid pieces of a scene into which a person could walk."""
     simple: list[Solid] = []
     rest: list[tuple[str, trimesh.Trimesh]] = []
     things: dict[str, list[trimesh.Trimesh]] = {}

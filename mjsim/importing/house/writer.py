@@ -73,7 +73,7 @@ def write_house(house: ImportedHouse, folder: Path, catalogue: Catalogue) -> Pat
 
 
 def set_points(catalogue: Path, points: int) -> None:
-    """Set the number of points for objects in a catalogue file."""
+    """Set in a catalogue file at how many points of the house objects can lie."""
     text = catalogue.read_text(encoding="utf-8")
     catalogue.write_text(text.replace("[house]\n", f"[house]\npoints = {points}\n", 1), encoding="utf-8")
 

@@ -22,7 +22,7 @@ _FLAT = 1e-5  # maximum thickness of a set of points that counts as flat, in met
 
 @dataclass(frozen=True, eq=False)
 class ClosedBody:
-    """A closed body, and the repairs that were needed to close it."""
+    """A closed mesh, and the repairs that were needed to close it."""
 
     mesh: trimesh.Trimesh  # closed surface in metres, with outward normals
     pieces: int  # number of connected pieces of the original surface

@@ -37,7 +37,7 @@ class ImportedObject:
 
     @property
     def size(self) -> Floats:
-        """The size of the bounding box of all colliding parts in metres, shape (3,)."""
+        """The size (3,) in metres of the bounding box around all collision shapes."""
         return np.asarray(np.ptp(np.concatenate(self.hulls), axis=0))
 
 

@@ -57,7 +57,7 @@ def tilt(points: Floats, centre: Floats, down: Floats) -> float:
 
 
 def foot(points: Floats, centre: Floats) -> Floats:
-    """Return the corners (8, 3) of a low foot that keeps points (n, 3) from rolling away, in metres."""
+    """Return the corners (8, 3) of a low foot that keeps an object with vertices (n, 3) from rolling, in metres."""
     low, high = points.min(axis=0), points.max(axis=0)
     reach = np.minimum(centre[:2] - low[:2], high[:2] - centre[:2])
     half = np.clip(_FOOT_SLOPE * (centre[2] - low[2]), MIN_WIDTH / 2, np.maximum(0.8 * reach, MIN_WIDTH / 2))

@@ -48,7 +48,7 @@ class Atlas:
         return np.asarray(np.stack((places[..., 0], 1.0 - places[..., 1]), axis=-1))
 
     def texels(self) -> tuple[Ints, Floats]:
-        """Return the triangle (k,) and the barycentric coordinates (k, 3) of each pixel, block by block."""
+        """Return the index of the triangle (k,) and the barycentric coordinates (k, 3) of each pixel."""
         faces = np.repeat(np.arange(len(self.blocks)), np.prod(self.blocks[:, 2:], axis=1))
         pixels = self._pixels() - self.blocks[faces, :2] + 0.5
         flat = np.pad(self.shapes[faces], ((0, 0), (0, 0), (0, 1)))

@@ -113,7 +113,7 @@ class Carrying:
         self._strained[:] = state.strained
 
     def update(self, held_posture: tuple[float, float, float]) -> None:
-        """Update the targets of all hands without a motion. Cancel commands that push objects into walls."""
+        """Update the targets of hands that are not picking or placing. Cancel commands that push objects into walls."""
         person = self._person
         left, right = person.held
         left, right = -1 if left is None else left, -1 if right is None else right

@@ -40,7 +40,7 @@ class Grips:
         self.reset()
 
     def nearest_grip(self, hand: int, item: int) -> int:
-        """Return the grip of an object (0 or 1) to which the hand has to turn less."""
+        """Return the grip of an object, 0 or 1, for which the hand has to turn less."""
         return self.grip_along(item, self._data.site_xmat[self._hand_sites[hand], 0::3])
 
     def grip_along(self, item: int, forward: NDArray[np.float64]) -> int:

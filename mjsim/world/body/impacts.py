@@ -40,7 +40,7 @@ class ImpactDetector:
         self._surroundings = (tuple(clearance), dt)
 
     def detects(self, gripped: tuple[int, ...]) -> bool:
-        """Return True if a loose object falls fast, or a `gripped` object may soon hit furniture or the other one."""
+        """Return True if a loose object falls fast, or if one that is `gripped` may soon hit furniture or the other."""
         first, second = (*gripped, -1, -1)[:2]
         return bool(_detects(self._arrays, self._surroundings, first, second))
 

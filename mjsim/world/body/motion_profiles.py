@@ -62,7 +62,7 @@ def change_velocity(
 
 @kernel
 def change_turn_rate(command: Command, rate: float, max_rate: float, max_change: float) -> None:
-    """Change the commanded yaw rate towards a target by at most `max_change`, within `max_rate`, in rad/s."""
+    """Bring the commanded yaw rate closer to `rate`, by at most `max_change`. All rates are in rad/s."""
     change = min(max_rate, max(-max_rate, rate)) - command[TURN]
     command[TURN] += min(max_change, max(-max_change, change))
 

@@ -28,7 +28,7 @@ Motion = Generator[None, None, bool]
 Steps = Generator[None, None, None]
 
 DIVISION = 8  # number of parts into which each physics step is divided while an object is fast or strained
-MAX_LAG = 0.1  # distance of a loaded hand from its target above which its load is caught, in metres
+MAX_LAG = 0.1  # a held object is stuck if its hand is farther than this from its target, in metres
 # Length of a firm grip above which the grip pulls its object in within a few physics steps, in metres
 MAX_STRETCH = 0.005
 
@@ -91,8 +91,8 @@ class Person:
     def is_strained(self, hand: int) -> bool:
         """Return True if the load of a hand is about to become fast.
 
-        A load that is caught at furniture is thrown as soon as it comes free. A grip that has just become firm pulls
-        its object away from whatever the object touches.
+        A held object that is stuck at furniture is thrown as soon as it comes free. A grip that has just become firm
+        pulls its object away from whatever the object touches.
         """
         if not self.grips.is_firm(hand):
             return False
@@ -131,7 +131,7 @@ class Person:
         return not self.data.tree_awake[self.scene.index.trees[item]]
 
     def walk(self, move: Move) -> None:
-        """Change the commanded velocities and head pitch towards a move, within the person's limits."""
+        """Bring the commanded velocities and head pitch closer to those of a move, within the person's limits."""
         command, person, dt = self.rig.motion, self.parameters, self.dt
         forward, left, turn, look = float(move.forward), float(move.left), float(move.turn), float(move.look)
         change_velocity(command, forward, left, person.fastest_walk, person.walking_acceleration * dt)

@@ -108,7 +108,7 @@ class Gait(NamedTuple):
 def command(
     body: NDArray[np.float64], forward: float, left: float, turn: float, look: float, gait: Gait
 ) -> None:
-    """Change the commands in a body state towards a move in m/s and rad/s."""
+    """Bring the commanded velocities of a body closer to those of a move, in m/s and rad/s."""
     motion = body[FORWARD:SERVO]
     motion_profiles.change_velocity(motion, forward, left, gait.max_speed, gait.acceleration * gait.dt)
     motion_profiles.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)

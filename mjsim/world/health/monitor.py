@@ -155,7 +155,7 @@ class HealthMonitor:
         return self._anomalies.find(data, self._flags, settling.objects, gripped)
 
     def resume(self) -> None:
-        """Accept the current positions after the person and held objects were moved without physics."""
+        """Take the current positions as correct after the person and held objects were moved without physics."""
         self._anomalies.move_anchors(self._rig.data)
 
     def get_state(self) -> HealthState:

@@ -23,7 +23,7 @@ from mjsim.world.walking.polyline import (
     rest_of,
 )
 
-ARRIVED_WITHIN = 0.06  # distance from the end of the path at which a walk ends, in metres
+ARRIVED_WITHIN = 0.06  # a walk ends within this distance of the end of its path, in metres
 
 WALKING, TURNING, ARRIVED, BLOCKED, CHANGED = range(5)  # phases of a walk
 # Indices into `progress`: the shortest remaining distance so far (metres), and when it was reached (seconds).
@@ -109,7 +109,7 @@ def sidestep(
     obstacles: Obstacles,
     pace: Pace,
 ) -> tuple[float, float]:
-    """Return the point to which the person walks instead of `target` to avoid objects on the floor.
+    """Return a point to walk to in place of `target`, so that the person avoids objects on the floor.
 
     The person at (x, y) passes the nearest object ahead on the side that needs the smaller sidestep. If that
     side is blocked, the person tries the other side. If the other side is blocked too or needs a detour, the

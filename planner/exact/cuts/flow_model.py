@@ -71,7 +71,7 @@ class FlowModel:
         return np.array(result.variable_values(self.flow))
 
     def multipliers(self, result: mathopt.SolveResult) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the dual values of the objects and of the cuts, in steps."""
+        """Return the dual values of the objects and of the cuts. Their unit is a step."""
         return np.array(result.dual_values(self.cover)), np.array(result.dual_values(self.cuts))
 
 

@@ -33,7 +33,7 @@ def root_bound(
     prices: NDArray[np.int64],
     cuts: Sequence[tuple[Cut, int]],
 ) -> RootBound:
-    """Return the lower bound that results from any prices of objects and any multipliers >= 0 of cuts.
+    """Return a lower bound on tour lengths, for any prices of objects and any nonnegative multipliers of cuts.
 
     Every tour pays each price once, and gains nothing from a cut. The reduced length of an arc is its length less the
     price of the object at its head and less its coefficients times the multipliers. Node potentials, which are

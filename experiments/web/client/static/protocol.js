@@ -5,14 +5,14 @@
 /** @typedef {"loading" | "ready" | "running" | "paused" | "over" | "failed"} Phase */
 /** @typedef {{ type: "view"; width: number; height: number; codec?: "h264" | "jpeg" | "none"; field_of_view?: number | null }} View A request for a view of this size in CSS pixels. The codec is `none` if the page itself draws the view. */
 /** @typedef {{ type: "hello"; tab: string; trial: string; view: View }} Hello The first message of a connection. `tab` is a random name that the page keeps when it reconnects. */
-/** @typedef {{ type: "takeover" }} TakeOver A request to continue a session that is open in another page. It answers an `occupied` message. */
+/** @typedef {{ type: "takeover" }} TakeOver A request to continue a session that is open on another page. Clients send it after an `occupied` message. */
 /** @typedef {{ type: "run"; until?: number | null }} RunMessage A request to start or resume the clock. `until` is the first promise (see `Inputs`), or None. */
 /** @typedef {{ number: number; step?: number | null; forward?: number; left?: number; turn?: number; look?: number; yaw?: number; pitch?: number; press?: "act" | "left hand" | "right hand" | null; scroll?: number }} Input An input event from the keyboard, mouse, gamepad or touch screen. */
 /** @typedef {{ type: "inputs"; inputs: Array<Input>; until?: number | null }} Inputs The participant's inputs in chronological order. Each input is sent only once. */
 /** @typedef {{ type: "seen"; frame: number }} Seen An acknowledgement that the browser has shown the frame with this number. */
 /** @typedef {{ type: "beat" }} Beat A heartbeat. The server sends two per second, and the page answers each of them. */
 /** @typedef {{ type: "display"; draw: "browser" | "server"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null; field_of_view?: number | null }} Display A report on the display quality over the last 5 s, which is written to the log as a `DisplayEvent`. */
-/** @typedef {{ type: "draw"; draw: "browser" | "server"; reason: string }} Draw A notice that the browser or the server now draws the view. It is logged with its reason. */
+/** @typedef {{ type: "draw"; draw: "browser" | "server"; reason: string }} Draw A notice that says whether the browser or the server now draws the view. It is logged with the reason. */
 /** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "picture lost" | "restarted" | "silent" | "taken over" }} Pause A request to stop the clock. The reason is written to the log. */
 /** @typedef {{ type: "blur"; away: boolean }} Blur A notice that the page has lost or regained the keyboard focus. It is written to the log. */
 /** @typedef {{ type: "leave" }} Leave A request to end the trial immediately. */
@@ -24,7 +24,7 @@
 /** @typedef {{ type: "snapshot"; step: number; input: number; time: number; busy: boolean; body: Array<number>; eye: Array<number>; hands: Array<Array<number>>; held: [string | null, string | null]; objects: Record<string, Array<number>>; models: Record<string, string>; gone: Array<string> }} Snapshot The state at the start of a control step. One snapshot per step is sent to clients that draw the view. */
 /** @typedef {{ shape: "box" | "cylinder" | "sphere"; position: [number, number, number]; size: [number, number, number]; rgba: [number, number, number, number]; role: string; x_ray: boolean; object: string | null; outlined: boolean }} Marker A virtual object that is drawn in the house. */
 /** @typedef {{ type: "markers"; markers: Array<Marker> }} Markers The markers of the HUD. They are sent to clients that draw the view whenever they change. */
-/** @typedef {{ type: "pictures"; pictures: Record<string, string>; example: Record<string, string>; markers: Array<string> }} Pictures Pictures to which `hud` messages refer, as data URLs by key. Each page receives them once. */
+/** @typedef {{ type: "pictures"; pictures: Record<string, string>; example: Record<string, string>; markers: Array<string> }} Pictures The pictures that `hud` messages refer to, which are sent once to each page. Keys map to data URLs. */
 /** @typedef {{ text: string; detail: string; picture: string | null; target_picture: string | null; number: number | null; done: boolean; current: boolean; carried: boolean }} ChecklistItem A row of the task list. */
 /** @typedef {{ label: string; place: string; picture: string | null }} BinEntry A receptacle in the list of bins. `place` is split at its line break if it is too long for one line. */
 /** @typedef {{ label: string | null; picture: string | null }} InventorySlot The contents of a hand. Both fields are None if the hand is empty. */

@@ -265,7 +265,10 @@ def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
     walked, pictures = _walked(changed, tmp_path, monkeypatch)
     assert ("returning" in pictures) is ("sites" in settings or "5f000000" in settings)
     assert [fault for fault in walked.faults if "cannot be used" not in fault] == []
-    assert "Nobody can start at the moment" in pictures["paused"] and "No more participants needed" in pictures["full"]
+    assert (
+        "Nobody can start at the moment" in pictures["paused"]
+        and "No more participants needed" in pictures["full"]
+    )
 
 
 @pytest.mark.usefixtures("quick")
