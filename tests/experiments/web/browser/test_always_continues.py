@@ -162,10 +162,12 @@ def test_a_browser_that_stops_for_30_s_continues_by_itself(tmp_path, request, br
         )
 
 
-def test_a_page_that_was_taken_over_says_so_and_takes_back(tmp_path, chromium):
+@pytest.mark.parametrize("other", ["tab", pytest.param("firefox_page", marks=pytest.mark.long)])
+def test_a_page_that_was_taken_over_says_so_and_takes_back(tmp_path, request, chromium, other):
     with task(tmp_path, "server") as (server, _):
         context = chromium.new_context()
-        first, second = Chromium(context.new_page()), Chromium(context.new_page())
+        first = Chromium(context.new_page())
+        second = Chromium(context.new_page()) if other == "tab" else request.getfixturevalue(other)
         begin(first, server.url)
         second.goto(first.evaluate("location.href"))
         second.wait_for(f"{TITLE} === 'This session is open on another page'")
@@ -184,11 +186,20 @@ def test_a_page_that_was_taken_over_says_so_and_takes_back(tmp_path, chromium):
         first.wait_for(f"{TITLE} === 'Paused'")
         first.click("#panel-actions .button")
         settles(first, PLAYING, 2.0)
+        second.wait_for(replaced)
 
 
-@pytest.mark.parametrize("draw", ["auto", pytest.param("browser", marks=pytest.mark.long)])
-def test_a_lost_picture_stops_the_clock_until_it_is_back(tmp_path, chromium_page, draw):
-    page = chromium_page
+@pytest.mark.parametrize(
+    ("browser", "draw"),
+    [
+        ("chromium", "auto"),
+        pytest.param("chromium", "browser", marks=pytest.mark.long),
+        pytest.param("firefox", "auto", marks=pytest.mark.long),
+        pytest.param("firefox", "browser", marks=pytest.mark.long),
+    ],
+)
+def test_a_lost_picture_stops_the_clock_until_it_is_back(tmp_path, request, browser, draw):
+    page = request.getfixturevalue(f"{browser}_page")
     page.resize(480, 270)  # drawn quickly: on a busy machine, a slow page would let the server draw
     with task(tmp_path, draw) as (server, _):
         begin(page, server.url)
