@@ -15,7 +15,7 @@ GoldenFrame = Callable[..., Comparison]
 
 @pytest.fixture
 def golden_frame(request: pytest.FixtureRequest, tmp_path: Path) -> GoldenFrame:
-    """Return a function that compares a frame with the file `golden/<name>.png` of a test file.
+    """Return a function that compares a frame with the golden image `golden/<name>.png`.
 
     The folder `golden` is next to the test file or in a parent folder. `golden_frame(frame)` uses the name of
     the test, and `golden_frame(frame, "hall")` uses the name `hall`. Keyword arguments are passed to

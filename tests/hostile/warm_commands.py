@@ -216,7 +216,9 @@ def _fault(case: Case, code: int, output: str, before: Mapping[str, str], after:
     if UNSTABLE in output:
         return "accepted, but its physics failed"
     lost = [name for name in before if after.get(name) != before[name]]
-    if lost and not (case.changes and all(name.startswith(f"{case.changes}/") for name in lost)):
+    if lost and not (
+        code == 0 and case.changes and all(name.startswith(f"{case.changes}/") for name in lost)
+    ):
         return f"lost {lost[0]}"
     new = [name for name in after if name not in before and not (name.endswith(PREVIEW) and name in output)]
     if half := [name for name in new if _is_half(name, code, after)]:

@@ -33,7 +33,7 @@ def check_files(folder: Path, *, replace: bool) -> None:
 
 
 def write_analysis(folder: Path, analysis: Analysis, report: str, further: Mapping[str, Any]) -> None:
-    """Write the files of an analysis atomically. The statistics include `further` values. `report` is in HTML."""
+    """Write the report (HTML) and the statistics of an analysis atomically. `further` contains more statistics."""
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / STATISTICS, {**analysis.as_json(), **further})
     table = people_table(analysis.table)

@@ -82,7 +82,7 @@ class Surroundings:
 
 
 class SimulatedPerson:
-    """A simulated participant who goes through a study according to a `Planned` visit."""
+    """A simulated participant who goes through a study as planned in advance."""
 
     def __init__(self, planned: Planned, around: Surroundings, rehearsed: Rehearsed) -> None:
         self._planned, self._around, self.rehearsed = planned, around, rehearsed

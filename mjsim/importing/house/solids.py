@@ -64,7 +64,7 @@ class Solids:
 
 
 def make_solids(pieces: Iterable[ScenePiece]) -> Solids:
-    """Create the collision shapes of all solid pieces of a scene into which a person could walk."""
+    """Create collision shapes for the solid pieces of a scene that a person could walk into."""
     simple: list[Solid] = []
     rest: list[tuple[str, trimesh.Trimesh]] = []
     things: dict[str, list[trimesh.Trimesh]] = {}
