@@ -244,7 +244,9 @@ def test_a_lost_picture_stops_the_clock_until_it_is_back(tmp_path, request, brow
         else:
             undrawable = f"{TITLE} === 'This browser cannot draw the apartment'"
             page.wait_for(undrawable)
+            before = page.evaluate(CLOCK)
             remains(page, undrawable)
+            assert page.evaluate(CLOCK) == before, "the clock ran behind the dialog"
             page.click("#panel-actions .button")
             page.wait_for(f"document.getElementById('panel') && {TITLE} === 'Paused'")
             page.click("#panel-actions .button")
