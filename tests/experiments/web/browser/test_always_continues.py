@@ -133,10 +133,17 @@ def pauses(journal):
     return [event["reason"] for event in events if event["event"] == "pause"]
 
 
-def assert_stopped_for_loss(reasons):
-    """Check that a lost picture has paused the clock. A slow page may have been paused as silent just before."""
-    assert reasons
-    assert reasons[0] in ("picture lost", "silent")
+def wait_for_loss(journal, earlier=0):
+    """Wait for the pause of a lost picture, and return the number of pauses. `earlier` is their number before.
+
+    A pause is written with the first control step after it. A slow page may have been paused as silent just before.
+    """
+    until = time.monotonic() + PATIENCE
+    while len(reasons := pauses(journal)) == earlier:
+        assert time.monotonic() < until, "the clock did not stop"
+        time.sleep(0.2)
+    assert reasons[earlier] in ("picture lost", "silent")
+    return len(reasons)
 
 
 @pytest.mark.long
@@ -235,8 +242,7 @@ def test_a_lost_picture_stops_the_clock_until_it_is_back(tmp_path, request, brow
         settles(page, PLAYING)
         shown = "document.getElementById('world').hidden"
         assert not page.evaluate(shown)
-        stopped = len(pauses(journal))
-        assert_stopped_for_loss(pauses(journal))
+        stopped = wait_for_loss(journal)
         page.evaluate("loss.loseContext()")
         if draw == "auto":
             settles(page, f"{shown} && {PLAYING}")
@@ -251,4 +257,4 @@ def test_a_lost_picture_stops_the_clock_until_it_is_back(tmp_path, request, brow
             page.wait_for(f"document.getElementById('panel') && {TITLE} === 'Paused'")
             page.click("#panel-actions .button")
             page.wait_for(PLAYING)
-        assert_stopped_for_loss(pauses(journal)[stopped:])
+        wait_for_loss(journal, stopped)
