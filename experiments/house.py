@@ -195,7 +195,7 @@ class House:
 
 
 def read_words(language: str = "en") -> Mapping[str, Mapping[str, Any]]:
-    """Return the texts of a language as a dictionary of sections.
+    """Return all texts in a language, grouped by section.
 
     Raises:
         ConfigError: The language is not available.

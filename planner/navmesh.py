@@ -127,7 +127,7 @@ class NavMesh:
         return self.island_of(point) is not None
 
     def snap(self, point: ArrayLike, max_distance: float = 1.0, island: int = 0) -> NDArray[np.float64]:
-        """Return the nearest point on an island, by default the largest one, to a point (x, y) in metres.
+        """Return the point of an island that is nearest to a point (x, y) in metres. Island 0 is the largest.
 
         A point that is already on the island is returned unchanged. The tolerance of `is_navigable` does not
         apply. Raises NotNavigableError if the island is more than `max_distance` metres away.

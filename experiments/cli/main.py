@@ -72,7 +72,7 @@ examples:
 
 
 def parser(*loaded: str) -> argparse.ArgumentParser:
-    """Create an argument parser for the `loaded` commands. Without any, it can only list the names of all commands."""
+    """Create an argument parser for the `loaded` commands. If there are none, it can only list all command names."""
     top = Parser(
         prog="mjsim",
         description=DESCRIPTION,

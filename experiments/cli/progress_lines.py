@@ -8,7 +8,7 @@ INTERVAL_S = 5.0  # minimum time between two lines, in seconds
 
 
 class ProgressLines(Progress):
-    """Progress bars that are not drawn. Instead, an update prints a line if the last line is old enough."""
+    """Progress as lines of text instead of bars. An update prints a line if the last line is old enough."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(disable=True, **settings)

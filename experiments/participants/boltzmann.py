@@ -66,7 +66,7 @@ class Boltzmann:
 
 
 def with_parameter(text: str) -> ParticipantFactory:
-    """Return a factory of Boltzmann participants. `text` is their temperature. Raises ConfigError if it is invalid."""
+    """Return a factory of Boltzmann participants. `text` is a temperature. Raises ConfigError if it is invalid."""
     try:
         temperature = float(text)
     except ValueError:

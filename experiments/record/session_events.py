@@ -200,7 +200,7 @@ class DisplayEvent(LoggedEvent, frozen=True):
 
 
 class DrawEvent(LoggedEvent, frozen=True):
-    """The other side now draws the view, or the browser draws it with another resolution.
+    """The view is now drawn by the server instead of the browser or vice versa, or at another resolution.
 
     Attributes:
         draw: `browser` or `server`, depending on which of them draws from now on.

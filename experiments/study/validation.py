@@ -37,7 +37,7 @@ def check_study(path: Path, *, recruits: bool = False) -> Study | None:
     if "study" not in file.content:
         return None
     study = read_people_study(path)
-    if importlib.util.find_spec("httpx") is None:  # Phases need the extra `people`, but simulations do not.
+    if importlib.util.find_spec("httpx") is None:  # Only visits by people need the extra `people`.
         return study
     from experiments.study.plan import plan_of
 

@@ -136,7 +136,7 @@ def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[in
 
 
 def inapplicable(exclusions: Exclusions, rows: Sequence[Row]) -> tuple[Rule, ...]:
-    """Return the rules whose measures only people have. If any row is from a person, return an empty tuple."""
+    """Return rules whose columns simulated participants do not have. If any row is from a person, return no rules."""
     from experiments.record.metrics import Displays  # imported here so that commands start fast
 
     from_people = {"inattentive", "recruitment_known", *(field.name for field in fields(Displays))}

@@ -30,7 +30,7 @@ class Preview:
 
 @dataclass(frozen=True)
 class InvalidLink:
-    """A link that does not come from the platform, and the reason why it is invalid."""
+    """An invalid link to the study, and the reason why the platform cannot have made it."""
 
     reason: str
 

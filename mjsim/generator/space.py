@@ -282,7 +282,7 @@ class Space:
 
 
 def _islands(distance: Floats, radius: float) -> tuple[int, Any]:
-    """Return the number of connected parts of the floor plus one, and the part of each cell, or 0 for none."""
+    """Count the connected parts of the floor. Return their number plus one, and the part of each cell, from 1, or 0."""
     return cv2.connectedComponents((distance > radius).astype(np.uint8), connectivity=4)
 
 

@@ -64,7 +64,7 @@ class BoxOccluders:
         centre, normal = positions - view.position, axes[rows, self._thin]
         across, along = axes[rows, one] * size[rows, one, None], axes[rows, two] * size[rows, two, None]
         ahead = np.einsum("ij,ij->i", normal, centre)
-        # Closer boxes are not used, because the near plane could cut them open.
+        # Closer boxes are not used, because the near plane could clip them, which makes their inside visible.
         clear = 1.5 * view.near * np.sqrt(1.0 + view.half_height**2 * (1.0 + aspect**2))
         usable = (np.abs(ahead) - size[rows, self._thin] > clear) & ~translucent_geoms(self._model)[ids]
         distance = np.maximum(np.linalg.norm(centre, axis=1), 1e-6)

@@ -19,7 +19,7 @@ MOMENTUM = 0.8
 FIRST_STEPS, FIRST_STEP_SIZES = 150, (1.0, 0.02)
 MAX_STEPS, MIN_STEPS, STEP_SIZES = 30, 4, (0.2, 0.03)
 STEP_ROWS = 60_000  # approximate number of rows that are filled to fit a large table
-SLICE = 1 << 13  # least number of rows filled between two checks of the deadline, which takes about 3 ms
+SLICE = 1 << 13  # minimum number of rows between two checks of the deadline; filling them takes about 3 ms
 STEP, BEST = range(2)  # indices into `Ascent.progress`
 
 

@@ -20,7 +20,7 @@ BATCH = 100  # number of resamples that are processed at a time, to limit memory
 
 @dataclass(frozen=True)
 class WaldTest:
-    """A Wald F test of an effect, whose error degrees of freedom follow Satterthwaite."""
+    """A Wald F test of an effect, with Satterthwaite's error degrees of freedom."""
 
     statistic: float
     df1: int

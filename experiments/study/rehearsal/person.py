@@ -69,7 +69,7 @@ class Surroundings:
     home: Callable[[str], House]  # loads the house of the participant with a link
     parameters: Mapping[str, str]  # query parameters of the platform's links, with empty ids
     factor: float  # factor by which waiting times are divided
-    hasty: bool = False  # True to submit each form too early first, to check that the server refuses it
+    hasty: bool = False  # True to submit each form too early once, which the server must refuse
     watch: Watch = _ignore  # called with the name of each page and the server's response
 
     @functools.cached_property

@@ -102,7 +102,7 @@ class FormPhase:
         return self.texts.items
 
     def page(self, visitor: Visitor, refused: Again | None = None) -> Page:
-        """Return the page with the form, filled with refused, drafted or earlier values."""
+        """Return the page with the form. It contains the values of a refused form, a draft or an earlier answer."""
         form = refused.values.get("form") if refused else None
         return Page(
             self._template,

@@ -18,7 +18,7 @@ HELLO_TIMEOUT = 10.0  # timeout for receiving the first message, in seconds
 OCCUPIED_TIMEOUT = 60.0  # timeout for the reply to `occupied`, in seconds
 CLOSE_TIMEOUT = 0.5  # how long to wait for a connection to close, in seconds
 MAX_WAITING = 300  # maximum number of messages in the send queue
-RATE, BURST = 200.0, 1200.0  # maximum numbers of messages and inputs per second and in a burst
+RATE, BURST = 200.0, 1200.0  # maximum number of messages and inputs: per second, and in a burst
 MAX_ERRORS = 50  # number of rejected messages after which a connection is closed
 
 

@@ -125,7 +125,7 @@ class _Acknowledger:
         self._error: OSError | None = None
 
     def request(self, number: int, step: int) -> None:
-        """Request an acknowledgement up to this input and step. Steps without new inputs may be delayed."""
+        """Acknowledge all inputs and steps up to these numbers soon. This may be delayed if there is no new input."""
         if number == self._number and step < self._newest + MAX_UNWRITTEN:
             return
         self._number, self._newest = number, step

@@ -53,7 +53,7 @@ def marker_picture(house: House, trial: TrialConfig) -> MarkerPicture:
         regret=False,
     )
     key = fingerprint(config, trial_inputs(config, house.catalogue))
-    # The name begins like that of the welcome page's picture, so exported pages leave the file out.
+    # Exported pages omit files whose names begin with `view`.
     path = cached_scene(house.catalogue, scenes_folder()) / f"view-{key}.json"
     if path.is_file():
         return msgspec.json.decode(path.read_bytes(), type=MarkerPicture)

@@ -53,7 +53,7 @@ class BrowserViewer(Viewer):
             self.drawer.set_view(self.view)
 
     def camera(self, world: World) -> CameraView | None:
-        """Return the eye camera with the view's aspect ratio, for pointers to objects outside the view."""
+        """Return the eye camera with the view's aspect ratio. Arrows that point to objects outside the view need it."""
         view = self.view
         if view is None:
             return None

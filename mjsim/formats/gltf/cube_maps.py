@@ -66,7 +66,7 @@ def _cut(corners: Floats, sign: float, i: int, j: int) -> Floats:
 
 
 def _between(a: Floats, b: Floats, at: Floats, bt: Floats) -> Floats:
-    """Return the points (t, k) between `a` and `b` at which values that go from `at` to `bt` are zero."""
+    """Interpolate between `a` and `b`, whose values are `at` and `bt`. Return the points (t, k) with the value zero."""
     share = np.divide(at, at - bt, out=np.zeros_like(at), where=at != bt)[:, None]
     return a + share * (b - a)
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 Boxes = NDArray[np.float64]  # rows of x0, y0, z0, x1, y1, z1 in metres, shape (n, 6)
 _HIDDEN = ("guard", "shadow")  # default classes of geoms that are not drawn as solids
-# Axes of the default classes for walls, by the end of their names.
+# Axes of the default classes for walls, by the last letter of their names.
 _AXES = {"x": "0 1 0 0 0 1", "y": "1 0 0 0 0 1"}
 
 

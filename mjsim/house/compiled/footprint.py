@@ -126,7 +126,7 @@ def geom_name(model: mujoco.MjModel, geom: int) -> str:
 
 
 class Floor(NamedTuple):
-    """The obstacles on a floor, with a grid to look up those near a person. All arrays are for kernels."""
+    """The obstacles on a floor, as arrays for kernels. Each cell of a grid lists the obstacles near it."""
 
     # Edges of the obstacles, counter-clockwise. Columns: start x, start y, direction x, direction y, length.
     edges: NDArray[np.float64]

@@ -49,7 +49,7 @@ def overlaps(compiled: Compiled) -> list[DrawnFault]:
 
 
 def coplanar_faces(compiled: Compiled) -> list[DrawnFault]:
-    """Find visible faces of boxes in the same plane that share more than `FLICKER` of their area.
+    """Find pairs of visible box faces that are coplanar and overlap by more than `FLICKER` of their area.
 
     Faces of the same plain material look the same, so they are not reported.
     """

@@ -22,7 +22,7 @@ _BAND = (0.05, 1.8)  # range of heights in which solids obstruct a person, in me
 _WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))
 _GAP = 0.6  # half the maximum width of openings that count as closed, in metres
 _PAD = 2 * _GAP + 0.3  # margin of the grid around the scene, in metres
-_DRAWN = 10.0  # additional weight of cells in which the source draws a floor
+_DRAWN = 10.0  # additional weight of cells in which the imported scene has a visible floor
 _LEAST_SHARE = 0.15  # minimum share of the floor that outer walls must enclose
 _MIN_AREA = 3.0  # minimum area enclosed by the walls of a house, in square metres
 # Floor around the obstacles that belongs to a house without walls, in metres. Ground planes extend farther.

@@ -171,7 +171,7 @@ def _box(name: str, low: Floats, high: Floats) -> Solid:
 
 
 def _compact(extents: Floats) -> bool:
-    """Return True if a solid is small enough for furniture, and False if it is a wall."""
+    """Return True if a solid is small enough to be furniture, and False if it is a wall."""
     return bool(extents[:2].max() < _FURNITURE)
 
 

@@ -170,6 +170,6 @@ def held_in(room: Floats, size: Floats) -> int:
 
 
 def _reference(house: str, folder: Path) -> str:
-    """Return the name of a house, or its path relative to the folder if it is given by a path."""
+    """Return the name of a house. If `house` is a path, return the path relative to the folder."""
     named = parse_house(house)
     return os.path.relpath(Path(named.name).resolve(), folder.resolve()) if named.is_path else named.name

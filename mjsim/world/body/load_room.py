@@ -47,7 +47,7 @@ def carry_clearance(scene: Scene) -> ClearanceField:
 def drawn_in(
     forward: float, left: float, radius: float, body: BodyMotion, carrying: CarryingParameters
 ) -> tuple[float, float]:
-    """Return a hand position (forward, left) near a posture at which a load will not collide soon.
+    """Return a hand position (forward, left) close to the given one at which the load has enough room.
 
     First, a sideways shift is tried, for example past a door frame. If it does not help, the hand is pulled
     towards the body's axis until the line from the axis to the hand is clear.

@@ -166,7 +166,7 @@ class Person:
         self.rig.motion[3] = min(highest, max(lowest, target))
 
     def face(self, point: NDArray[np.float64], tolerance: float, heading: float | None = None) -> Steps:
-        """Stop, look at a point (3,), and turn to it or to `heading` until the error is below `tolerance`."""
+        """Stop, look at a point (3,), and turn to face it, or to `heading`, until the error is below `tolerance`."""
         motion = self.motion
         for _ in range(self.steps(motion.turn_timeout)):
             error = self.rig.bearing(point) if heading is None else wrap(heading - self.rig.heading)

@@ -13,8 +13,8 @@ from planner.exact.cuts.graph import StateGraph
 from planner.solvers import Deadline
 
 PARTS = 1_000_000  # number of parts of a unit of flow in maximum flows, which are computed with integers
-SUPPORT = 1e-9  # least flow of an arc that is considered
-VIOLATION = 1e-3  # least violation of a new cut
+SUPPORT = 1e-9  # arcs with less flow are ignored
+VIOLATION = 1e-3  # minimum violation of a new cut
 
 
 class Cut(NamedTuple):
