@@ -131,12 +131,12 @@ class _Search:
     def _integer_round(self, nodes: int, seed: int, most_arcs: int) -> bool:
         """Search for a shortest flow on the arcs of tours that may be better. Return True if it is not a tour.
 
-        If there are more than twice as many arcs, only the `most_arcs` arcs of the shortest tours are used. The bound
-        then is at most the length of other tours.
+        If there are more than 2.5 times as many arcs, only the `most_arcs` arcs of the shortest tours are used. The
+        bound then is at most the length of other tours.
         """
         least = cast(RootBound, self.root).least
         limit = self.upper * self.parts
-        if np.count_nonzero(least <= limit) > 2 * most_arcs:
+        if np.count_nonzero(least <= limit) > 2.5 * most_arcs:
             limit = min(limit, int(np.partition(least, most_arcs)[most_arcs]) - 1)
         graph = self.graph.only(least <= limit)
         model = FlowModel(graph, self.step, list(self.known.values()), integer=True)
