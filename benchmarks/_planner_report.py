@@ -188,4 +188,4 @@ def draw_proofs(axes: Any, runs: Sequence[dict[str, Any]]) -> None:
         axes.plot([], [], "x", color="grey", label="budget spent, not proven")
     axes.set(yscale="log", xlabel="objects", ylabel="CPU time, s", title="exact: time to proof")
     axes.set_xticks(sorted({r["objects"] for r in runs}))
-    axes.legend(loc="upper left")
+    axes.legend(loc="lower right")
