@@ -50,8 +50,8 @@ class Planner:
         self._asked = False
         self._running: list[Future[Any]] = []
         self._regrets: Future[Mapping[Visit, Regret]] | None = None  # regrets of the last state, if live
-        self._stop = threading.Event()  # event that stops the computation of regrets
-        self._over = threading.Event()  # event that also stops completed visits' regrets
+        self._stop = threading.Event()  # stops the computation of the last state's regrets
+        self._over = threading.Event()  # stops the computation of completed visits' regrets
         # One thread computes the regrets of completed visits, in the order of the visits.
         self._judges = ThreadPoolExecutor(1, "regrets") if live else None
         # Evaluators for completed visits, and for regrets that are shown. They share neither tables nor, unless

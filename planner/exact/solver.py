@@ -15,7 +15,7 @@ from planner.solvers import Deadline, SolveLimit
 
 DEFAULT_WORK = 4_000_000  # default number of states to expand, which takes about 4 s including tables
 MAX_OBJECTS = 60
-MAX_ARCS = 40_000  # approximate maximum number of arcs for branch and cut, with which it may take minutes
+MAX_ARCS = 40_000  # approximate maximum number of arcs for branch and cut, which may need minutes and 1 GB
 
 
 @dataclass(frozen=True)
