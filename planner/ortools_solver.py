@@ -12,7 +12,7 @@ from ortools.constraint_solver import pywrapcp, routing_enums_pb2
 from planner.greedy_solver import GreedySolver, nearest_first
 from planner.plan import Certificate, Plan, Proof, Visit
 from planner.problem import RoutingProblem, make_plan, possible_next, spanning_bound, tour_length
-from planner.solvers import SolveLimit
+from planner.solvers import Deadline, SolveLimit
 
 FIRST_SOLUTIONS = (1, 10)  # number of solutions after which the first two searches of `improve` stop
 # The same for other searches by default. A search takes 0.1 s for 6 objects and 2 s for 24 objects.
@@ -60,11 +60,12 @@ class OrToolsSolver:
         best = GreedySolver().solve(problem)
         yield best
         limit = _with_budget(limit)
+        deadline = Deadline.of(limit, started)
         for work in (*(w for w in FIRST_SOLUTIONS if limit.work is None or w < limit.work), limit.work):
-            left = None if limit.seconds is None else started + limit.seconds - time.perf_counter()
-            if limit.stopped or (left is not None and left <= 0):
+            if (left := deadline.left) == 0.0:
                 return
-            plan = self.solve(problem, seed=seed, limit=replace(limit, work=work, seconds=left))
+            seconds = None if math.isinf(left) else left
+            plan = self.solve(problem, seed=seed, limit=replace(limit, work=work, seconds=seconds))
             if plan.improves_on(best):
                 best = plan
                 yield best

@@ -44,11 +44,6 @@ class SolveLimit:
             if value is not None and not 0 < value < math.inf:
                 raise PlannerError(f"SolveLimit.{name} must be positive and finite, or None; got {value}")
 
-    @property
-    def stopped(self) -> bool:
-        """True if the solver must stop."""
-        return self.stop is not None and self.stop.is_set()
-
 
 @dataclass(frozen=True)
 class Deadline:

@@ -80,30 +80,12 @@ def with_room(nodes: Nodes, more: int) -> Nodes:
 
 
 @kernel
-def smallest_but(values: NDArray[np.int64], size: int, count: int) -> int:
-    """Return the `count`-th smallest of the first `size` values, by bisection."""
-    low, high = INFINITE, -INFINITE
-    for k in range(size):
-        low, high = min(low, values[k]), max(high, values[k])
-    while low < high:
-        middle = (low + high) >> 1
-        below = 0
-        for k in range(size):
-            below += values[k] <= middle
-        if below >= count:
-            high = middle
-        else:
-            low = middle + 1
-    return low
-
-
-@kernel
 def keep_best(nodes: Nodes, width: int) -> tuple[Nodes, int]:
     """Return the `width` best states, and the smallest total among the dropped states or `INFINITE`."""
     size = nodes.size[0]
     if size <= width:
         return nodes, INFINITE
-    bar = smallest_but(nodes.total, size, width)
+    bar = np.partition(nodes.total[:size], width - 1)[width - 1]
     ties = width
     for k in range(size):
         if nodes.total[k] < bar:

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.exact.annealing import anneal, completed, tour_actions
-from planner.exact.expand import PLACE_BITS, expand, offer_roots
+from planner.exact.expand import PLACE_BITS, expand, root_layer
 from planner.exact.instance import MAX_SEARCHED, Instance
 from planner.exact.moves import moves_of
 from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown, warm_bound
-from planner.exact.nodes import FIRST_ROOM, NO_PARENT, keep_best, new_nodes
+from planner.exact.nodes import NO_PARENT, keep_best
 from planner.exact.table import BIN_ROWS, INFINITE, Solution
 from planner.exact.warm_start import Start
 from planner.solvers import NEVER, Deadline
@@ -94,17 +94,15 @@ def beam_pass(bound: Bound, upper: int, width: int, max_states: int, deadline: D
     A new tour must be shorter by more than the tie tolerance. If more than `max_states` states were expanded
     or the deadline has passed, the pass ends early and returns the lower bound of the root.
     """
-    n, prices = len(bound.instance.home), bound.prices
+    moves, prices = moves_of(bound.instance), bound.prices
     limit = upper - bound.instance.tie + prices
     history: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
-    here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
-    offer_roots(bound.instance, bound.table, here, after, limit)
-    left_out, expanded, actions = INFINITE, 0, None
-    for layer in range(n + 1):
+    here, left_out, expanded, actions = root_layer(bound), INFINITE, 0, None
+    for layer in range(len(bound.instance.home) + 1):
         if expanded > max_states or deadline.over():
             return Pass(upper, None, bound.root, expanded)
         here, worse = keep_best(here, width)
-        found = expand(bound.instance, bound.table, here, after, limit, width, deadline)
+        found = expand(moves, bound.table, here, limit, width, deadline)
         if found is None:
             return Pass(upper, None, bound.root, expanded)
         here, after, early, states, end = found
@@ -115,7 +113,7 @@ def beam_pass(bound: Bound, upper: int, width: int, max_states: int, deadline: D
         if end >= 0:
             upper = int(here.cost[end]) - prices
             actions = _actions(bound, history, layer, end)
-        here, after = after, new_nodes(FIRST_ROOM)
+        here = after
     lower = max(bound.root, min(upper, min(limit, left_out) - prices))
     return Pass(upper, actions, lower, expanded)
 

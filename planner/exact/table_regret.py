@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
-from planner.exact.expand import PLACE_BITS, expand, offer_roots
+from planner.exact.expand import PLACE_BITS, expand, root_layer
 from planner.exact.instance import MAX_SEARCHED
 from planner.exact.moves import NOTHING, Moves, moves_of
 from planner.exact.multipliers import Bound
-from planner.exact.nodes import FIRST_ROOM, Nodes, new_nodes, slot_of
+from planner.exact.nodes import Nodes, slot_of
 from planner.exact.table import INFINITE, CostTable
 from planner.plan import Visit, VisitKind
 from planner.solvers import Deadline
@@ -70,18 +70,16 @@ def costs_by_pass(
         return None, 0
     limit = longest + 1 + bound.prices
     layers: list[Nodes] = []
-    here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
-    offer_roots(bound.instance, table, here, after, limit)
-    states = 0
+    here, states = root_layer(bound), 0
     for _ in range(n + 1):
-        expanded = expand(bound.instance, table, here, after, limit, UNLIMITED, deadline)
+        expanded = expand(moves, table, here, limit, UNLIMITED, deadline)
         if expanded is None:
             return None, states
         layers.append(expanded.here)
         states += int(expanded.here.size[0])
         if states > max_states:
             return None, states
-        here, after = expanded.after, new_nodes(FIRST_ROOM)
+        here = expanded.after
     lengths = [np.zeros(0, np.int64)] * (n + 2)
     layers.append(here)
     for k in range(n, -1, -1):

@@ -119,9 +119,9 @@ class TaskSearch:
 
         started, metric, large = time.perf_counter(), problem.integers.metric, self._is_large(problem)
         instance, n = make_instance(problem, metric), len(problem.shipments)
-        start, stopped = self.start(problem, instance), limit is not None and limit.stopped
-        work = 0 if stopped else self.share(problem)
-        rows, end = HURRIED_ROWS if stopped or large else WARM_ROWS, Deadline.of(limit)
+        start, end = self.start(problem, instance), Deadline.of(limit)
+        work = 0 if end.over() else self.share(problem)
+        rows = HURRIED_ROWS if end.over() or large else WARM_ROWS
         *_, best = improving_tours(instance, seed, work, end, self._solver.passes, start, rows)
         self.spend(best.expanded)
         actions = _annealed(instance, seed, best.actions, first=start is None) if large else best.actions
