@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.exact.instance import Instance
+from planner.exact.moves import moves_of
 from planner.exact.table import CostTable, Solution, fill_layers, new_table, walk
 from planner.plan import Certificate, Proof
 from planner.solvers import NEVER, Deadline
@@ -56,7 +57,7 @@ def follow(inst: Instance, table: CostTable, row: int) -> tuple[int, list[int]]:
     if COMPILER in sys.modules:
         from planner.exact.table_kernels import walk as compiled_walk
 
-        length, count = compiled_walk(inst, table, row, actions)
+        length, count = compiled_walk(moves_of(inst), table, row, actions)
     else:
-        length, count = walk(inst, table, row, actions)
+        length, count = walk(moves_of(inst), table, row, actions)
     return int(length), actions[:count].tolist()

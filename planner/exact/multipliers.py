@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
 from planner.exact.instance import Instance
+from planner.exact.moves import Moves, moves_of
 from planner.exact.table import CostTable, new_table, rows_of
 from planner.exact.table_kernels import fill, fill_rows, walk
 from planner.exact.warm_start import Start
@@ -74,7 +75,7 @@ def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:
     table = new_table(instance, group)
     table.multipliers[:] = start.multipliers
     fill(instance, table)
-    total, _ = walk(instance, table, len(table.bin) - 1, np.empty(2 * n + 2, np.int64))
+    total, _ = walk(moves_of(instance), table, len(table.bin) - 1, np.empty(2 * n + 2, np.int64))
     return Bound(instance, table, int(total) - int(table.multipliers.sum()), np.zeros(n))
 
 
@@ -157,14 +158,15 @@ def fit(
         np.array([first_size * (last_size / first_size) ** (k / steps) for k in range(steps)]),
         np.array([0, -1]),
     )
-    while not climb(instance, table, ascent, upper, SLICE):
+    moves = moves_of(instance)
+    while not climb(instance, moves, table, ascent, upper, SLICE):
         if deadline.over():
             return None
     return Bound(instance, table, int(ascent.progress[BEST]), ascent.violation)
 
 
 @kernel
-def climb(inst: Instance, table: CostTable, ascent: Ascent, upper: int, rows: int) -> bool:
+def climb(inst: Instance, moves: Moves, table: CostTable, ascent: Ascent, upper: int, rows: int) -> bool:
     """Continue a subgradient ascent until `rows` table rows are filled. Return True if the ascent is finished.
 
     At the end, the table contains the best multipliers and the corresponding entries. The ascent is a single
@@ -178,7 +180,7 @@ def climb(inst: Instance, table: CostTable, ascent: Ascent, upper: int, rows: in
             table.multipliers[j] = int(min(max(price, -table.dearest), table.dearest))
         fill_rows(inst, table, 0, table.bin.shape[0])
         rows -= table.bin.shape[0]
-        total, count = walk(inst, table, table.bin.shape[0] - 1, actions)
+        total, count = walk(moves, table, table.bin.shape[0] - 1, actions)
         value = total - table.multipliers.sum()
         if value > progress[BEST]:
             progress[BEST] = value

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.exact.instance import FAR, Instance
+from planner.exact.moves import Moves
 from planner.plan import Certificate
 
 BIN_ROWS = 50_000  # row limit of a table with one group per bin, enough for 30 objects and 6 bins
@@ -126,49 +127,37 @@ def fill_layers(inst: Instance, table: CostTable) -> None:
         table.bin[rows], table.object[rows] = carrying, np.minimum(alone, drop + empty[:, inst.home])
 
 
-def walk(inst: Instance, table: CostTable, row: int, actions: NDArray[np.int64]) -> tuple[int, int]:
+def walk(moves: Moves, table: CostTable, row: int, actions: NDArray[np.int64]) -> tuple[int, int]:
     """Follow a shortest tour in the table. Return its length with multipliers and its number of actions.
 
     `row` is the table row of the objects that remain at the start. The actions, as defined in `Solution`, are
     written to `actions`, of shape (2 n + 2,) or larger. `table_kernels` compiles this function.
     """
-    to_object, to_bin, at = inst.root, inst.root_bin, -1
-    first = inst.carried[0] if inst.carried.size > 0 else -1  # bins of the objects in hand, -1 for none
-    second = inst.carried[1] if inst.carried.size > 1 else -1
-    total, count = 0, 0
+    n, place, total, count = moves.end.shape[1] - 1, moves.end.shape[0] - 1, 0, 0
+    left = np.zeros(table.size.size, np.int64)  # number of remaining objects in each group
+    for j in range(n):
+        left[table.group[j]] = row // table.stride[j] % (table.size[table.group[j]] + 1)
     while True:
-        best, action = INFINITE, 0
-        for b in (first, second):
-            if b >= 0:
-                other = second if b == first else first
-                cost = to_bin[b] + table.bin[row, b, other if other >= 0 else b]
-                if cost < best:
-                    best, action = cost, -1 - b
-        for j in range(inst.home.size if second < 0 else 0):
-            left, c = row - table.stride[j], inst.home[j]
-            if row // table.stride[j] % (table.size[table.group[j]] + 1) == 0 or j == at:
+        best, picked, then = INFINITE, n, -1
+        for j in range(-1, n):  # the first move, with index `NOTHING`, picks up nothing
+            if j >= 0 and left[table.group[j]] == 0:
                 continue
-            cost = to_object[j] + table.multipliers[j]
-            if first >= 0:
-                own_last = inst.to_bin[j, first] + table.bin[left, first, c]
-                cost += min(own_last, inst.to_bin[j, c] + table.bin[left, c, first])
-            else:
-                cost += table.object[left, j]
-            if cost < best:
-                best, action = cost, j
-        if best == INFINITE:
+            below, price = (row - table.stride[j], table.multipliers[j]) if j >= 0 else (row, 0)
+            for way in range(2):
+                end = moves.end[place, j, way]
+                if end < 0:
+                    continue
+                rest = table.entries[below * table.width + moves.column[end]]
+                cost = moves.length[place, j, way] + price + rest
+                if cost < best:
+                    best, picked, then = cost, j, end
+        if then < 0:
             return total, count
         if count == 0:
             total = best
-        actions[count] = action
-        count += 1
-        if action >= 0:
-            row -= table.stride[action]
-            to_object, to_bin, at = inst.between[action], inst.to_bin[action], action
-            c = inst.home[action]
-            first, second = (first, c) if first >= 0 else (c, -1)
-        else:
-            b = -1 - action
-            to_object, to_bin, at = inst.to_bin[:, b], inst.bins[b], -1
-            other = second if first == b else first
-            first, second = other if other != b else -1, -1
+        if picked >= 0:
+            actions[count], row, count = picked, row - table.stride[picked], count + 1
+            left[table.group[picked]] -= 1
+        if then < moves.bins**2:
+            actions[count], count = -1 - then // moves.bins, count + 1
+        place = then

@@ -94,7 +94,7 @@ def test_fitted_multipliers_bound_the_optimum_and_growing_does_not_harm(seed, n,
     instance = make_instance(problem, problem.integers.metric)
     table = new_table(instance, np.arange(n))
     fill(instance, table)
-    optimum, _ = walk(instance, table, len(table.bin) - 1, np.empty(2 * n + 2, np.int64))
+    optimum, _ = walk(moves_of(instance), table, len(table.bin) - 1, np.empty(2 * n + 2, np.int64))
     bound = first_bound(instance, optimum)
     roots = [bound.root]
     roots.append(counted_by_bin(bound, optimum, 1 << n, NEVER).root)

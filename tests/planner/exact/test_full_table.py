@@ -10,6 +10,7 @@ from planning_cases import random_problem
 from planner.exact import full_table
 from planner.exact.full_table import by_table
 from planner.exact.instance import FAR, make_instance
+from planner.exact.moves import moves_of
 from planner.exact.solver import ExactSolver
 from planner.exact.table import fill_layers, new_table, walk
 from planner.exact.table_kernels import fill
@@ -42,8 +43,8 @@ def test_numpy_and_the_kernels_fill_in_and_follow_the_same(seed, n, onboard, bin
     gone = ~(np.arange(1 << n)[:, None] >> np.arange(n) & 1).astype(bool)  # the other values are undefined
     np.testing.assert_array_equal(other.object[gone], one.object[gone])
     actions, plain = np.empty(2 * n + 2, np.int64), np.empty(2 * n + 2, np.int64)
-    length, count = compiled_walk(instance, one, (1 << n) - 1, actions)
-    assert walk(instance, other, (1 << n) - 1, plain) == (length, count)
+    length, count = compiled_walk(moves_of(instance), one, (1 << n) - 1, actions)
+    assert walk(moves_of(instance), other, (1 << n) - 1, plain) == (length, count)
     np.testing.assert_array_equal(plain[:count], actions[:count])
 
 

@@ -7,10 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from planner.exact.nodes import smallest_but
 from planner.exact.solver import ExactSolver
 from planner.problem import RoutingProblem, Shipment
 from planner.solvers import SolveLimit
@@ -67,10 +64,3 @@ def test_a_process_with_another_number_of_threads_finds_the_same_plan(tmp_path):
         ).stdout
     plan = SEARCH.solve(problem, seed=3)
     assert printed.strip() == f"{[*map(str, plan.visits)]} {plan.lower_bound.hex()}"
-
-
-@given(st.lists(st.integers(-(2**29), 2**29), min_size=1, max_size=40), st.data())
-def test_the_bar_for_the_best_states_is_the_order_statistic(values, data):
-    size = data.draw(st.integers(1, len(values)))
-    count = data.draw(st.integers(1, size))
-    assert smallest_but(np.array(values, np.int64), size, count) == sorted(values[:size])[count - 1]
