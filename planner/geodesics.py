@@ -80,12 +80,6 @@ class Geodesics:
         np.fill_diagonal(result, 0.0)
         return result
 
-    def distances_from(self, point: ArrayLike, points: ArrayLike) -> NDArray[np.float64]:
-        """Return the geodesic distances from one point to n points (n, 2) in metres, shape (n,)."""
-        targets = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-        between = self.distances_between(np.asarray(point, dtype=np.float64)[None], targets)
-        return np.asarray(between[0])
-
     def distances_between(self, sources: ArrayLike, targets: ArrayLike) -> NDArray[np.float64]:
         """Return the geodesic distances from points (s, 2) to points (t, 2) in metres, shape (s, t)."""
         source, target = (self._query(*self._locate(points)) for points in (sources, targets))

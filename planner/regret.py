@@ -1,16 +1,16 @@
 """Compute the regrets of visits, which are the extra tour lengths compared with the best next visit."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 from planner.errors import ProblemError
+from planner.exact.full_table import TaskTable
 from planner.exact.instance import make_instance
 from planner.exact.moves import moves_of
 from planner.exact.multipliers import Bound, first_bound, grown, warm_bound
 from planner.exact.solver import ExactSolver
 from planner.exact.table_regret import Costs, costs_by_pass, costs_in
 from planner.exact.task_search import TaskSearch
-from planner.exact.task_table import TaskTable
 from planner.geodesics import Geodesics
 from planner.plan import Plan, Status, Visit
 from planner.problem import RoutingProblem, after, is_for, possible_next, same_problem, tour_length
@@ -44,6 +44,7 @@ class RegretBounds:
     exact: float | None  # the regret, or None if it is not proven
 
 
+@dataclass(eq=False)
 class RegretEvaluator:
     """An evaluator that computes the regrets of visits with the exact planner.
 
@@ -52,43 +53,23 @@ class RegretEvaluator:
     computes regrets of up to `radius` metres exactly.
     """
 
-    def __init__(
-        self,
-        geodesics: Geodesics,
-        *,
-        solver: ExactSolver | None = None,
-        capacity: int = 2,
-        limit: SolveLimit | None = None,
-        radius: float = RADIUS,
-        search: TaskSearch | None = None,
-    ) -> None:
-        self._geodesics, self._capacity = geodesics, capacity
-        self._solver = solver or ExactSolver()
-        self._problems = TaskProblems(geodesics, capacity)
-        self._table = TaskTable(self._solver)
-        self._limit, self._radius = limit, radius
-        self._search = search or TaskSearch(self._solver, limit)
+    geodesics: Geodesics
+    solver: ExactSolver = field(default_factory=ExactSolver)
+    capacity: int = 2
+    limit: SolveLimit | None = None
+    radius: float = RADIUS
+    search: TaskSearch | None = None
+
+    def __post_init__(self) -> None:
+        self._search = self.search or TaskSearch(self.solver, self.limit)
+        self._problems, self._table = TaskProblems(self.geodesics, self.capacity), TaskTable(self.solver)
         self._last: tuple[TaskState, dict[Visit, Regret]] | None = None
         # Problem of the last state, and the plan for it
         self._planned: tuple[RoutingProblem, Plan] | None = None
 
-    def copy(self) -> "RegretEvaluator":
-        """Return a copy of this evaluator with the same limit, but with a budget of its own."""
-        return self.limited(self._limit, TaskSearch(self._solver, self._limit))
-
-    def limited(self, limit: SolveLimit | None, search: TaskSearch | None = None) -> "RegretEvaluator":
-        """Return a copy of this evaluator with a limit on each search, for use in another thread.
-
-        The copies share the budget of states, unless they receive a `search` of their own.
-        """
-        return RegretEvaluator(
-            self._geodesics,
-            solver=self._solver,
-            capacity=self._capacity,
-            limit=limit,
-            radius=self._radius,
-            search=search or self._search,
-        )
+    def limited(self, limit: SolveLimit) -> "RegretEvaluator":
+        """Return a copy with a limit on each search, for use in another thread. Both share the budget of states."""
+        return replace(self, limit=limit, search=self._search)
 
     def all(self, state: TaskState, plan: Plan | None = None) -> dict[Visit, Regret]:
         """Return the regret of each possible next visit, starting with the best visit.
@@ -100,9 +81,9 @@ class RegretEvaluator:
             problem = self._problems.problem(state)
             found = regrets(
                 problem,
-                self._solver,
-                limit=self._limit,
-                radius=self._radius,
+                self.solver,
+                limit=self.limit,
+                radius=self.radius,
                 plan=plan if plan is not None and is_for(plan, problem) else None,
                 table=self._table,
                 search=self._search,
@@ -160,9 +141,9 @@ class RegretEvaluator:
         return self._planned[1]
 
     def _solve(self, problem: RoutingProblem, before: tuple[RoutingProblem, Plan] | None) -> Plan:
-        if self._solver.applies(problem):
-            return self._search.plan(problem, limit=self._limit, before=before)
-        return self._solver.solve(problem, limit=self._limit)
+        if self.solver.applies(problem):
+            return self._search.plan(problem, limit=self.limit, before=before)
+        return self.solver.solve(problem, limit=self.limit)
 
 
 def same_state(one: TaskState, other: TaskState) -> bool:
@@ -187,23 +168,14 @@ def regrets(
     """Return the regrets of all possible next visits, starting with the best visit.
 
     The exact planner evaluates all visits at once. It uses the full table for up to 18 objects, and for up to 24
-    objects one pass over all tours that are at most `radius` longer than the best tour. Regrets above the radius
+    objects one pass over all tours that are at most `radius` metres longer than the best tour. Regrets above the radius
     are lower bounds, marked as `capped`. If the pass is too large, the radius is halved, down to 0.1 m. If the
     pass is still too large, if the best tour is not proven optimal, or with more objects, the regrets are estimated
     with lower bounds, and are not `proven`. With other planners or capacities, the remaining task is solved
-    separately after each visit.
+    separately after each visit, with `limit` for each of these problems.
 
-    Args:
-        problem: Routing problem of the remaining task.
-        solver: Planner. With the exact one, regrets that are `proven` and not `capped` are exact.
-        limit: Limit for the search of the exact planner, or for each problem that another planner solves.
-        radius: Largest regret that is computed exactly, in metres.
-        plan: Plan for this problem, or None to search for one.
-        table: Table of an earlier state of the task, or None.
-        search: Search whose budget is used, or None for a budget of `limit`.
-
-    Raises:
-        ProblemError: The radius is negative.
+    `plan` is a plan for this problem, or None to search for one. `table` and `search` come from earlier states of the
+    task. Without a `search`, the exact planner has the budget of `limit`. Raises ProblemError if a radius is negative.
     """
     if not radius >= 0:
         raise ProblemError(f"the radius of regrets must be at least 0 m, got {radius}")

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Mapping
 from concurrent import futures
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any, TypeVar
 
 from planner.errors import PlannerError
@@ -57,7 +58,7 @@ class Planner:
         # Evaluators for completed visits, and for regrets that are shown. They share neither tables nor, unless
         # the planner is live, budgets, so logged regrets do not depend on which pictures are drawn.
         self._judge = evaluator.limited(SolveLimit(stop=self._over)) if live else evaluator
-        self._display = evaluator if live else evaluator.copy()
+        self._display = evaluator if live else replace(evaluator, search=None)
         self._late: list[tuple[Any, Future[RegretBounds | None]]] = []  # label and regret of completed visits
         self.use(source)
 

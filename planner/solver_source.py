@@ -6,12 +6,12 @@ import threading
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
+from planner.exact.full_table import TaskTable
 from planner.exact.solver import ExactSolver
 from planner.exact.task_search import TaskSearch
-from planner.exact.task_table import TaskTable
 from planner.exact.warm_start import NOTHING_KNOWN
 from planner.geodesics import Geodesics
-from planner.plan import Plan, Status, Visit, VisitKind
+from planner.plan import Plan, Visit, VisitKind
 from planner.problem import RoutingProblem, tour_length
 from planner.route import XY, PlanSource, Route, TaskState, remaining
 from planner.solvers import SolveLimit, Solver
@@ -52,10 +52,8 @@ class _BackgroundSearch:
     def bounded(self, other: Plan) -> Plan:
         """Return a plan with the shown visits and the lower bound of another plan."""
         cost = tour_length(self.problem, self.shown)
-        optimal = other.status is Status.OPTIMAL and cost <= other.lower_bound + self.problem.tolerance(cost)
-        lower = cost if optimal else min(other.lower_bound, cost)
-        status = Status.OPTIMAL if optimal else Status.FEASIBLE
-        return Plan(self.shown, cost, lower, status, other.seconds, other.certificate)
+        plan = replace(other, visits=self.shown, cost=cost)
+        return plan.bounded(other.lower_bound, self.problem.tolerance(cost))
 
 
 class SolverSource(PlanSource):
@@ -82,8 +80,8 @@ class SolverSource(PlanSource):
     ) -> None:
         self.problems = TaskProblems(geodesics, capacity)
         self._solver, self._seed, self._limit = solver, seed, limit
-        self._table = TaskTable(solver) if isinstance(solver, ExactSolver) else None
-        self._unseen = TaskSearch(solver, limit) if isinstance(solver, ExactSolver) else None
+        exact = solver if isinstance(solver, ExactSolver) else ExactSolver()
+        self._table, self._unseen = TaskTable(exact), TaskSearch(exact, limit)
         self._warm = NOTHING_KNOWN
         self._planned: dict[str, XY] = {}  # positions of the loose objects when the plan was made
         self._search: _BackgroundSearch | None = None
@@ -147,12 +145,12 @@ class SolverSource(PlanSource):
         self._search = None
 
     def _solve(self, problem: RoutingProblem, *, shown: bool) -> Plan:
-        if self._table is None or self._unseen is None:
+        if not isinstance(self._solver, ExactSolver):
             return self._solver.solve(problem, seed=self._seed, limit=self._limit)
         plan = None if shown else self._table.plan(problem)
         if plan is not None:
             return plan
-        if self._unseen.continues(problem) or (not shown and self._planned and self._unseen.applies(problem)):
+        if self._unseen.continues(problem) or (not shown and self._planned and self._solver.applies(problem)):
             return self._unseen.plan(problem, seed=self._seed, limit=self._limit)
         plan = self._solver.solve(problem, seed=self._seed, limit=self._limit)
         if not shown:

@@ -37,7 +37,7 @@ class TaskProblems:
         distances[1:, 1:] = self._between(places)
         if places:
             here = self._snap(state.position)
-            distances[0, 1:] = distances[1:, 0] = self._geodesics.distances_from(here, places)
+            distances[0, 1:] = distances[1:, 0] = self._geodesics.distances_between([here], places)[0]
         return RoutingProblem(
             distances,
             0,

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import dijkstra
 from shapely.geometry.polygon import orient
 
 from mjsim.support.kernels import kernel
-from planner.navmesh import TOLERANCE, NavMesh
+from planner.navmesh import TOLERANCE, NavMesh, edges
 
 REPEATED = 1e-9  # distance below which two corners of a path are merged, in metres
 
@@ -43,15 +43,14 @@ class VisibilityGraph:
         found = [_reflex_vertices(island) for island in navmesh.islands]
         vertices = np.concatenate([np.empty((0, 6)), *found])
         island = np.repeat(np.arange(len(found)), [len(f) for f in found])
-        walls = _edges(navmesh.solid)
+        walls = edges(shapely.get_parts(navmesh.solid))
         views = []
         for i, vertex in enumerate(vertices):
             later = island == island[i]
             later[: i + 1] = False
             views.append(VisibleVertices(*visible_vertices(vertex, vertices, later, walls, TOLERANCE)))
         seen = _with_rows(csr_array((0, len(vertices))), views)
-        edges = csr_array(seen + seen.T)
-        return cls(vertices=vertices, island=island.astype(np.int64), walls=walls, edges=edges)
+        return cls(vertices, island.astype(np.int64), walls, edges=csr_array(seen + seen.T))
 
     def distances(
         self, sources: Sequence[VisibleVertices], targets: Sequence[VisibleVertices]
@@ -106,27 +105,15 @@ def _with_rows(edges: csr_array, views: Sequence[VisibleVertices]) -> csr_array:
     return csr_array(tuple(map(np.concatenate, parts)), shape=(size, size))
 
 
-def _rings(geometry: shapely.Geometry) -> list[NDArray[np.float64]]:
-    rings = []
-    for polygon in map(orient, shapely.get_parts(geometry)):
-        for ring in (polygon.exterior, *polygon.interiors):
-            rings.append(np.asarray(ring.coords, dtype=np.float64)[:-1])
-    return rings
-
-
-def _reflex_vertices(island: shapely.Geometry) -> NDArray[np.float64]:
+def _reflex_vertices(island: shapely.Polygon) -> NDArray[np.float64]:
     found = [np.empty((0, 6))]
-    for ring in _rings(island):
+    for closed_ring in shapely.get_rings(orient(island)):
+        ring = shapely.get_coordinates(closed_ring)[:-1]
         before, after = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
         a, b = ring - before, after - ring
         turn = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / (np.hypot(*a.T) * np.hypot(*b.T))
         found.append(np.hstack([ring, before, after])[turn < -1e-9])
     return np.concatenate(found)
-
-
-def _edges(geometry: shapely.Geometry) -> NDArray[np.float64]:
-    edges = [np.hstack([ring, np.roll(ring, -1, axis=0)]) for ring in _rings(geometry)]
-    return np.ascontiguousarray(np.concatenate([np.empty((0, 4)), *edges]))
 
 
 @kernel

@@ -201,7 +201,7 @@ def estimated_distance(house: "House", start: Point, goal: Point) -> float:
 def estimated_distances(house: "House", start: Point, goals: Sequence[Point]) -> list[float]:
     """Return the walking distances in metres from a point to several goals, or `FAR` if there is no path."""
     try:
-        return [float(gap) for gap in house.geodesics.distances_from(start, np.array(goals))]
+        return [float(gap) for gap in house.geodesics.distances_between([start], goals)[0]]
     except PlannerError:  # at least one goal is unreachable
         return [estimated_distance(house, start, goal) for goal in goals]
 

@@ -89,24 +89,18 @@ class OwnPlanner:
                 raise ProblemError(
                     f"the lower bound of {said.lower_bound:.6f} m exceeds the cost of {cost:.6f} m"
                 )
-            bound = check(problem, Plan(visits, cost, 0.0, Status.FEASIBLE, said.seconds))
+            plan = Plan(visits, cost, 0.0, Status.FEASIBLE, float(said.seconds))
+            return plan.bounded(check(problem, plan), problem.tolerance(cost))
         except Exception as error:  # a custom plan can contain anything, so any error can occur
             raise UserCodeError(
                 f"{self._what} gave a plan that does not hold: {describe(error)}{where}"
             ) from error
-        return _bounded(problem, said, cost, bound)
 
     def _with_bound(self, problem: RoutingProblem, plan: Plan) -> Plan:
         if self._exact is None or plan.status is Status.OPTIMAL or not self._exact.applies(problem):
             return plan
-        return _bounded(problem, plan, plan.cost, self._exact.solve(problem).lower_bound)
+        return plan.bounded(self._exact.solve(problem).lower_bound, problem.tolerance(plan.cost))
 
 
 def _copied(problem: RoutingProblem) -> RoutingProblem:
     return replace(problem, distances=problem.distances.copy())
-
-
-def _bounded(problem: RoutingProblem, plan: Plan, cost: float, bound: float) -> Plan:
-    optimal = cost - bound <= problem.tolerance(cost)
-    status = Status.OPTIMAL if optimal else Status.FEASIBLE
-    return Plan(plan.visits, cost, cost if optimal else bound, status, float(plan.seconds))

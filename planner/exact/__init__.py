@@ -4,8 +4,7 @@ The entry point is `solver.ExactSolver`. The module `table` contains the equatio
 planner works" in docs/planners.md explains the methods.
 
     solver        the planner, which uses a full table, a search, branch and cut, or OR-Tools
-    full_table    a table over all subsets of the objects
-    task_table    a full table that is reused for successive states of a task
+    full_table    tables over all subsets of the objects, which are reused for successive states of a task
     instance      a routing problem as integer arrays
     moves         all moves of a tour, from which costs of next visits and a tour's actions follow
     table         the recursion and its relaxation, and NumPy code for small tables

@@ -93,32 +93,18 @@ def _finish(inst: Instance, i: int, before: NDArray[np.int64]) -> int:
 
 def tour_actions(moves: Moves, order: NDArray[np.int64]) -> list[int]:
     """Return the actions of a shortest tour with a given order of picks, as defined in `Solution`."""
-    best: Ways = {len(moves.end) - 1: (0, [])}
-    for x in order.tolist():
-        _place(moves, best)
-        after: Ways = {}
-        for place in best:
-            _move(moves, best, place, x, after)
-        best = after
-    _place(moves, best)
-    return min(way for place, way in best.items() if moves.end[place, NOTHING, 0] == NOWHERE)[1]
-
-
-def _place(moves: Moves, best: Ways) -> None:
-    """Add the ways that place objects next. At the root, there can be two of them."""
-    for _ in range(2):
-        for place in list(best):
-            _move(moves, best, place, NOTHING, best)
-
-
-def _move(moves: Moves, best: Ways, place: int, x: int, after: Ways) -> None:
-    """Add the ways from a place that pick up object x or nothing, unless shorter ones are known."""
-    length, actions = best[place]
-    for end, leg in zip(moves.end[place, x].tolist(), moves.length[place, x].tolist(), strict=True):
-        if end != NOWHERE and (end not in after or length + leg < after[end][0]):
-            picked = [] if x == NOTHING else [x]
-            placed = [-1 - end // moves.bins] if end < moves.bins**2 else []
-            after[end] = length + leg, [*actions, *picked, *placed]
+    ways: Ways = {len(moves.end) - 1: (0, [])}
+    # Objects may be placed after each pick, and twice at the root.
+    for x in [NOTHING, NOTHING, *(move for k in order.tolist() for move in (k, NOTHING))]:
+        after: Ways = dict(ways) if x == NOTHING else {}
+        for place, (length, actions) in ways.items():
+            for end, leg in zip(moves.end[place, x].tolist(), moves.length[place, x].tolist(), strict=True):
+                if end != NOWHERE and (end not in after or length + leg < after[end][0]):
+                    picked = [] if x == NOTHING else [x]
+                    placed = [-1 - end // moves.bins] if end < moves.bins**2 else []
+                    after[end] = length + leg, [*actions, *picked, *placed]
+        ways = after
+    return min(way for place, way in ways.items() if moves.end[place, NOTHING, 0] == NOWHERE)[1]
 
 
 @inlined

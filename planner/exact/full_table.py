@@ -1,18 +1,27 @@
-"""Fill full tables, which have one row for every subset of the objects, and find shortest tours in them.
+"""Full tables, which have one row for every subset of the objects, and the shortest tours in them.
 
-Small tables are filled with NumPy unless numba is already loaded, because loading numba takes 0.5 s.
+A table is reused for successive states of a task until an object is moved, because it does not depend on the person's
+position or the carried objects. It is filled as soon as at most 18 objects remain. Small tables are filled with NumPy
+unless numba is already loaded, because loading numba takes 0.5 s.
 """
 
 import sys
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.exact.instance import Instance
+from planner.exact.instance import FAR, Instance, make_instance, to_visits
 from planner.exact.moves import moves_of
 from planner.exact.table import CostTable, Solution, fill_layers, new_table, walk
-from planner.plan import Certificate, Proof
+from planner.plan import Certificate, Plan, Proof, Visit
+from planner.problem import RoutingProblem, make_plan
 from planner.solvers import NEVER, Deadline
+
+if TYPE_CHECKING:
+    from planner.exact.solver import ExactSolver
 
 COMPILER = "numba"
 SLICE = 1 << 13  # number of rows filled between two checks of the deadline, which takes about 3 ms
@@ -61,3 +70,93 @@ def follow(inst: Instance, table: CostTable, row: int) -> tuple[int, list[int]]:
     else:
         length, count = walk(moves_of(inst), table, row, actions)
     return int(length), actions[:count].tolist()
+
+
+class TableState(NamedTuple):
+    """A task state as a row of a full table. The root of the instance is the person's current position."""
+
+    instance: Instance
+    table: CostTable
+    row: int
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Filled:
+    problem: RoutingProblem
+    instance: Instance
+    table: CostTable
+
+
+class TaskTable:
+    """A cache of a full table, which is kept until an object is moved."""
+
+    def __init__(self, solver: "ExactSolver") -> None:
+        self._solver = solver
+        self._filled: _Filled | None = None
+
+    def plan(self, problem: RoutingProblem) -> Plan | None:
+        """Return a plan that is proven optimal, or None if no full table can be used for the problem."""
+        started = time.perf_counter()
+        state = self._at(problem)
+        if state is None:
+            return None
+        length, actions = follow(state.instance, state.table, state.row)
+        visits = to_visits(state.instance, actions, state.names, problem.names[len(problem.shipments) :])
+        certificate = Certificate(Proof.FULL_TABLE, state.instance.unit, length)
+        return make_plan(problem, visits, length, length, started, certificate)
+
+    def costs(self, problem: RoutingProblem) -> tuple[dict[Visit, int], float] | None:
+        """Return the cost of each possible next visit in units, and the unit in metres.
+
+        A cost is the length of the remaining tour. The result is None if no full table can be used.
+        """
+        from planner.exact.table_regret import costs_in  # imported here because it loads the kernels
+
+        state = self._at(problem)
+        if state is None:
+            return None
+        carried = problem.names[len(problem.shipments) :]
+        return costs_in(
+            moves_of(state.instance), state.table, state.row, state.names, carried
+        ), state.instance.unit
+
+    def _at(self, problem: RoutingProblem) -> TableState | None:
+        state = _state(self._filled, problem) if self._filled is not None else None
+        if state is not None:
+            return state
+        if not self._solver.applies(problem):
+            return None
+        instance = make_instance(problem, problem.integers.metric)
+        if not self._solver.table_fits(instance):
+            return None
+        self._filled = _Filled(problem, instance, cast(CostTable, filled_table(instance)))
+        return _state(self._filled, problem)
+
+
+def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
+    """Return the state of a problem in an existing table, or None if the table does not contain it."""
+    before, n = filled.problem, len(problem.shipments)
+    same_kind = (problem.capacity, problem.resolution) == (before.capacity, before.resolution)
+    if not same_kind or not set(problem.names) <= set(before.names):
+        return None
+    left = [before.number[name] for name in problem.names[:n]]
+    if any(k >= len(before.shipments) for k in left):
+        return None  # an object that is loose now was carried when the table was filled
+    here, there = (each.stops(problem.visits)[1:] for each in (problem, before))
+    if not np.array_equal(problem.distances[np.ix_(here, here)], before.distances[np.ix_(there, there)]):
+        return None  # an object was moved
+    # Lengths of shortest paths from the start to the location of each visit, via locations that the table contains
+    metric = before.integers.metric[np.ix_(there, there)]
+    direct = np.rint(problem.distances[problem.start, here] / before.integers.unit).astype(np.int64)
+    legs = (direct[:, None] + metric).min(axis=0, initial=FAR)
+    bins = sorted({s.delivery for s in before.shipments} | set(before.onboard))
+    bin_of = [bins.index(location) for location in there[n:]]
+    root, root_bin = np.full_like(filled.instance.root, FAR), np.full_like(filled.instance.root_bin, FAR)
+    if len(problem.onboard) < problem.capacity:
+        root[left] = legs[:n]
+    root_bin[bin_of] = legs[n:]
+    carried = np.array(bin_of[n:], dtype=np.int64)
+    instance = filled.instance._replace(root=root, root_bin=root_bin, carried=carried)
+    names = before.names[: len(before.shipments)]
+    return TableState(instance, filled.table, sum(1 << k for k in left), names)

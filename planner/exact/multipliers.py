@@ -85,32 +85,23 @@ def grown(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
     Each split moves the object with the largest violation into a group of its own.
     """
     warm = not bound.violation.any()  # after a warm start, fit the existing groups first
-    while bound.root < upper - bound.instance.tie:
-        group: NDArray[np.int64] | None = bound.table.group
-        if not warm:
-            group = _one_apart(bound.table.group, bound.violation, max_rows)
-        elif rows_of(bound.table.group) > max_rows:
-            break
-        warm = False
-        if group is None:
-            break
+    group = bound.table.group if warm else _one_apart(bound)
+    while group is not None and rows_of(group) <= max_rows and bound.root < upper - bound.instance.tie:
         steps = max(MIN_STEPS, min(MAX_STEPS, STEP_ROWS // rows_of(group)))
         fitted = _refitted(bound, group, upper, steps, deadline)
         if fitted is None:
             break
-        bound = fitted
+        bound, group = fitted, _one_apart(fitted)
     return bound
 
 
-def _one_apart(
-    group: NDArray[np.int64], violation: NDArray[np.float64], max_rows: int
-) -> NDArray[np.int64] | None:
+def _one_apart(bound: Bound) -> NDArray[np.int64] | None:
+    group = bound.table.group.copy()
     size = np.bincount(group)[group] if len(group) else group
     if size.max(initial=1) == 1:
         return None
-    new = group.copy()
-    new[np.argmax(np.where(size > 1, violation, -1.0))] = group.max() + 1
-    return new if rows_of(new) <= max_rows else None
+    group[np.argmax(np.where(size > 1, bound.violation, -1.0))] = group.max() + 1
+    return group
 
 
 def counted_by_bin(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:

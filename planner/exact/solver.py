@@ -16,6 +16,9 @@ from planner.solvers import Deadline, SolveLimit
 DEFAULT_WORK = 4_000_000  # default number of states to expand, which takes about 4 s including tables
 MAX_OBJECTS = 60
 MAX_ARCS = 40_000  # approximate maximum number of arcs for branch and cut, which may need minutes and 1 GB
+# Limits of each pass of the search: number of rows in the bound's table, and number of states kept per layer
+TABLE_ROWS = (600, 2_500, 8_000, 16_000, BIN_ROWS, 1 << 17, 1 << 19, 1 << 20)
+WIDTHS = (1_500, 8_000, 20_000, 60_000, 60_000, 200_000, 1_000_000, 3_000_000)
 
 
 @dataclass(frozen=True)
@@ -29,22 +32,13 @@ class ExactSolver:
         name: Name of the planner in run records.
         table_bytes: Maximum size of a full table in bytes. A value of 0 disables full tables.
         most_searched: Number of objects above which branch and cut replaces the beam search.
-        passes: Limits of each pass: number of rows in the bound's table, and number of states kept per layer.
+        passes: Limits of each pass of the search.
     """
 
     name: str = "exact"
     table_bytes: int = 1 << 27  # enough for 18 objects and 6 bins, which takes 0.1 s
     most_searched: int = 24
-    passes: tuple[tuple[int, int], ...] = (
-        (600, 1_500),
-        (2_500, 8_000),
-        (8_000, 20_000),
-        (16_000, 60_000),
-        (BIN_ROWS, 60_000),
-        (1 << 17, 200_000),
-        (1 << 19, 1_000_000),
-        (1 << 20, 3_000_000),
-    )
+    passes: tuple[tuple[int, int], ...] = tuple(zip(TABLE_ROWS, WIDTHS, strict=True))
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
         """Solve a problem. The plan is OPTIMAL if proven, and otherwise FEASIBLE with the best known bound.
@@ -82,7 +76,8 @@ class ExactSolver:
             return f"the capacity of {problem.capacity} is above 2"
         if len(problem.shipments) > MAX_OBJECTS:
             return f"{len(problem.shipments)} shipments are more than {MAX_OBJECTS}"
-        if len(problem.shipments) > MAX_SEARCHED and not _few_arcs(problem):
+        bins = {s.delivery for s in problem.shipments} | set(problem.onboard)
+        if len(problem.shipments) > MAX_SEARCHED and len(problem.shipments) * len(bins) ** 2 > MAX_ARCS:
             return f"{len(problem.shipments)} shipments are more than {MAX_SEARCHED} and have too many bins"
         return "" if problem.integers.is_metric else "the distances break the triangle inequality"
 
@@ -154,8 +149,3 @@ class ExactSolver:
         n, m = instance.to_bin.shape
         exact = instance.tie == 0 and longest(instance) <= LONGEST
         return n > MAX_SEARCHED or (n > self.most_searched and exact and n * m * m <= MAX_ARCS)
-
-
-def _few_arcs(problem: RoutingProblem) -> bool:
-    bins = {s.delivery for s in problem.shipments} | set(problem.onboard)
-    return len(problem.shipments) * len(bins) ** 2 <= MAX_ARCS

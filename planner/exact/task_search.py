@@ -50,9 +50,6 @@ class TaskSearch:
         self._began_large = False
         self._most = math.inf  # number of loose objects up to which a proof seems possible
 
-    def applies(self, problem: RoutingProblem) -> bool:
-        return self._solver.applies(problem)
-
     def learn(self, problem: RoutingProblem, plan: Plan) -> None:
         """Use the order of a plan for this problem, and its multipliers if it has any, in later searches."""
         self._warm = self._warm.updated(problem, plan)
@@ -101,7 +98,7 @@ class TaskSearch:
             plan = self._bounded(problem, rest)
         else:
             plan = self._searched(problem, seed, limit)
-        return _raised(plan, lower)
+        return plan.bounded(max(lower, plan.lower_bound), SAME)
 
     def _bounded(self, problem: RoutingProblem, visits: tuple[Visit, ...]) -> Plan:
         from planner.exact.multipliers import first_bound, warm_bound
@@ -167,10 +164,3 @@ def rest_of(
     follows = set(rest) == left and np.allclose(legs, old_legs, rtol=0.0, atol=SAME)
     lower = plan.lower_bound - tour_length(before, done) - way.max() - shorter
     return rest if follows else None, float(lower)
-
-
-def _raised(plan: Plan, lower: float) -> Plan:
-    """Return a plan with a lower bound in metres, if this bound is better than its own one."""
-    if lower >= plan.cost - SAME:
-        return replace(plan, lower_bound=plan.cost, status=Status.OPTIMAL)
-    return replace(plan, lower_bound=max(plan.lower_bound, lower))

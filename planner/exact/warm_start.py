@@ -60,13 +60,8 @@ class WarmStart:
         return Start(
             np.unique(group, return_inverse=True)[1],
             np.array([prices.get(name, average) for name in names], np.int64),
-            self.indices(names),
+            [number[name] for name in self.order if name in number],
         )
-
-    def indices(self, names: Sequence[str]) -> list[int]:
-        """Return the indices of known objects among the names, in the order in which a good tour picks them up."""
-        number = {name: k for k, name in enumerate(names)}
-        return [number[name] for name in self.order if name in number]
 
 
 NOTHING_KNOWN = WarmStart({})

@@ -289,7 +289,7 @@ def slow(monkeypatch):
 
     class Slow(RegretEvaluator):
         def limited(self, limit):
-            return Slow(self._geodesics, limit=limit)
+            return Slow(self.geodesics, limit=limit)
 
         def all(self, state, plan=None):
             states.append(state)
@@ -350,7 +350,7 @@ def test_neither_the_start_nor_the_end_waits_for_proofs_or_regrets(geodesics, mo
 
     class Stuck(RegretEvaluator):
         def limited(self, limit):
-            return Stuck(self._geodesics, limit=limit)
+            return Stuck(self.geodesics, limit=limit)
 
         def all(self, *_):
             go.wait(60)
@@ -387,7 +387,7 @@ def test_regrets_that_are_not_computed_at_the_end_are_bounded(geodesics, monkeyp
 
     class Late(RegretEvaluator):
         def limited(self, limit):
-            return Late(self._geodesics, solver=SEARCH, limit=limit)
+            return Late(self.geodesics, solver=SEARCH, limit=limit)
 
         def bounds(self, *args):
             begun.set()

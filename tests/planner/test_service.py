@@ -164,5 +164,5 @@ def test_regrets_that_are_shown_leave_the_budget_of_those_that_are_logged(geodes
     guide = Planner(SolverSource(geodesics, solver("exact")), evaluator)
     guide.ask(Task(geodesics, 4).state)
     assert guide.regrets(shown=True) == guide.regrets() != {}
-    assert asked == [evaluator], "one budget for both"
+    assert asked[1] is evaluator is not asked[0], "one budget for both"
     assert guide.judge(guide.next, 0).exact == 0.0

@@ -17,9 +17,8 @@ from ortools.math_opt.python import mathopt
 from planner.exact.annealing import anneal, inserted, tour_actions, tour_units
 from planner.exact.cuts.connectivity import Cut, violated
 from planner.exact.cuts.flow_model import FlowModel, FractionalSolver, integer_flow
-from planner.exact.cuts.graph import LONGEST, StateGraph, state_graph
+from planner.exact.cuts.graph import LONGEST, StateGraph, state_graph, walks
 from planner.exact.cuts.root_bound import RootBound, root_bound
-from planner.exact.cuts.tours import walks
 from planner.exact.instance import Instance
 from planner.exact.moves import moves_of
 from planner.exact.table import INFINITE, Solution
@@ -38,11 +37,7 @@ PARTS = 1024  # parts of a unit in which multipliers are rounded
 
 
 def tours_by_cuts(
-    instance: Instance,
-    seed: int,
-    work: int,
-    deadline: Deadline,
-    first: Solution,
+    instance: Instance, seed: int, work: int, deadline: Deadline, first: Solution
 ) -> Iterator[Solution]:
     """Yield better tours and bounds than those of a first solution, until a tour is proven or the budget is spent."""
     search = _Search(instance, work, deadline, first)
@@ -95,12 +90,9 @@ class _Search:
         yield from self._rounds()
         more, arcs = self.root is not None, CORE
         while more and self.work >= NODE_WORK and self.deadline.left > STEP_S:
-            found_cycles, all_arcs = (
-                self._integer_round(self.work // NODE_WORK, seed, arcs),
-                len(self.graph.tail),
-            )
+            more = self._integer_round(self.work // NODE_WORK, seed, arcs) or arcs < len(self.graph.tail)
+            arcs = len(self.graph.tail)
             yield
-            more, arcs = found_cycles or arcs < all_arcs, all_arcs
 
     def _rounds(self) -> Iterator[None]:
         """Solve linear relaxations, and add the cuts that their flows violate."""

@@ -7,7 +7,6 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from ortools.math_opt import model_pb2
 from ortools.math_opt.python import mathopt
 
 from planner.exact.cuts.connectivity import Cut
@@ -27,38 +26,24 @@ class FlowModel:
     """
 
     def __init__(self, graph: StateGraph, step: int, cuts: Sequence[Cut], *, integer: bool) -> None:
-        arcs, nodes = np.arange(len(graph.tail)), np.unique([graph.tail, graph.head])
-        surplus = (nodes == graph.end).astype(float) - (nodes == graph.root)
-        bounds = np.concatenate([np.ones(graph.objects), surplus])
-        picking = graph.picks >= 0
-        weights = np.array([cut.coefficients(graph) for cut in cuts]).reshape(len(cuts), len(arcs))
-        cut_rows, cut_arcs = np.nonzero(weights)
-        ends = np.searchsorted(nodes, [graph.head, graph.tail]) + graph.objects
-        rows = np.concatenate([graph.picks[picking], *ends, cut_rows + len(bounds)])
-        columns = np.concatenate([arcs[picking], arcs, arcs, cut_arcs])
-        values = np.repeat([1.0, 1.0, -1.0], [picking.sum(), len(arcs), len(arcs)])
-        values = np.append(values, weights[cut_rows, cut_arcs])
-        order = np.lexsort((columns, rows))
-        proto = model_pb2.ModelProto()
-        proto.variables.ids.extend(arcs.tolist())
-        proto.variables.lower_bounds.extend([0.0] * len(arcs))
+        self.graph, self.model = graph, mathopt.Model()
+        self.cuts: list[mathopt.LinearConstraint] = []
         # Fractional flows need no upper bounds, because the other constraints imply them.
-        most = graph.most.tolist() if integer else [math.inf] * len(arcs)
-        proto.variables.upper_bounds.extend(most)
-        proto.variables.integers.extend([integer] * len(arcs))
-        proto.objective.linear_coefficients.ids.extend(arcs.tolist())
-        proto.objective.linear_coefficients.values.extend((graph.length // step).tolist())
-        proto.linear_constraints.ids.extend(range(len(bounds) + len(cuts)))
-        proto.linear_constraints.lower_bounds.extend([*bounds.tolist(), *[0.0] * len(cuts)])
-        proto.linear_constraints.upper_bounds.extend([*bounds.tolist(), *[math.inf] * len(cuts)])
-        proto.linear_constraint_matrix.row_ids.extend(rows[order].tolist())
-        proto.linear_constraint_matrix.column_ids.extend(columns[order].tolist())
-        proto.linear_constraint_matrix.coefficients.extend(values[order].tolist())
-        self.graph = graph
-        self.model = mathopt.Model.from_model_proto(proto)
-        self.flow = list(self.model.variables())
-        constraints = list(self.model.linear_constraints())
-        self.cover, self.cuts = constraints[: graph.objects], constraints[len(bounds) :]
+        most = graph.most.tolist() if integer else [math.inf] * len(graph.most)
+        self.flow = [self.model.add_variable(lb=0.0, ub=bound, is_integer=integer) for bound in most]
+        self.cover = [self.model.add_linear_constraint(lb=1.0, ub=1.0) for _ in range(graph.objects)]
+        nodes, ends = np.unique([graph.tail, graph.head]).tolist(), {graph.root: -1.0, graph.end: 1.0}
+        surplus = {node: ends.get(node, 0.0) for node in nodes}
+        balance = {node: self.model.add_linear_constraint(lb=s, ub=s) for node, s in surplus.items()}
+        fields = (graph.tail, graph.head, graph.picks, graph.length // step)
+        for flow, tail, head, k, length in zip(self.flow, *(field.tolist() for field in fields), strict=True):
+            self.model.objective.set_linear_coefficient(flow, length)
+            balance[tail].set_coefficient(flow, -1.0)
+            balance[head].set_coefficient(flow, 1.0)
+            if k >= 0:
+                self.cover[k].set_coefficient(flow, 1.0)
+        for cut in cuts:
+            self.add(cut)
 
     def add(self, cut: Cut) -> None:
         row, weights = self.model.add_linear_constraint(lb=0.0), cut.coefficients(self.graph)

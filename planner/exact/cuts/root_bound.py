@@ -28,10 +28,7 @@ class RootBound(NamedTuple):
 
 
 def root_bound(
-    graph: StateGraph,
-    parts: int,
-    prices: NDArray[np.int64],
-    cuts: Sequence[tuple[Cut, int]],
+    graph: StateGraph, parts: int, prices: NDArray[np.int64], cuts: Sequence[tuple[Cut, int]]
 ) -> RootBound:
     """Return a lower bound on tour lengths, for any prices of objects and any nonnegative multipliers of cuts.
 
