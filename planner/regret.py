@@ -62,7 +62,10 @@ class RegretEvaluator:
 
     def __post_init__(self) -> None:
         self._search = self.search or TaskSearch(self.solver, self.limit)
-        self._problems, self._table = TaskProblems(self.geodesics, self.capacity), TaskTable(self.solver)
+        self._problems, self._table = (
+            TaskProblems(self.geodesics, self.capacity),
+            TaskTable(self.solver.tabled),
+        )
         self._last: tuple[TaskState, dict[Visit, Regret]] | None = None
         # Problem of the last state, and the plan for it
         self._planned: tuple[RoutingProblem, Plan] | None = None
@@ -181,7 +184,7 @@ def regrets(
         raise ProblemError(f"the radius of regrets must be at least 0 m, got {radius}")
     if not isinstance(solver, ExactSolver) or not solver.applies(problem):
         return one_by_one(problem, solver, limit=limit)
-    costs = (table or TaskTable(solver)).costs(problem)
+    costs = (table or TaskTable(solver.tabled)).costs(problem)
     if costs is not None:
         return _ranked(problem, *costs)
     return _around_best(problem, search or TaskSearch(solver, limit), limit, radius, plan)

@@ -81,7 +81,7 @@ class SolverSource(PlanSource):
         self.problems = TaskProblems(geodesics, capacity)
         self._solver, self._seed, self._limit = solver, seed, limit
         exact = solver if isinstance(solver, ExactSolver) else ExactSolver()
-        self._table, self._unseen = TaskTable(exact), TaskSearch(exact, limit)
+        self._table, self._unseen = TaskTable(exact.tabled), TaskSearch(exact, limit)
         self._warm = NOTHING_KNOWN
         self._planned: dict[str, XY] = {}  # positions of the loose objects when the plan was made
         self._search: _BackgroundSearch | None = None

@@ -7,21 +7,19 @@ unless numba is already loaded, because loading numba takes 0.5 s.
 
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.exact.instance import FAR, Instance, make_instance, to_visits
+from planner.exact.instance import FAR, Instance, to_visits
 from planner.exact.moves import moves_of
 from planner.exact.table import CostTable, Solution, fill_layers, new_table, walk
 from planner.plan import Certificate, Plan, Proof, Visit
 from planner.problem import RoutingProblem, make_plan
 from planner.solvers import NEVER, Deadline
-
-if TYPE_CHECKING:
-    from planner.exact.solver import ExactSolver
 
 COMPILER = "numba"
 SLICE = 1 << 13  # number of rows filled between two checks of the deadline, which takes about 3 ms
@@ -89,10 +87,10 @@ class _Filled:
 
 
 class TaskTable:
-    """A cache of a full table, which is kept until an object is moved."""
+    """A cache of a full table, which is kept until an object is moved. `tabled` is `ExactSolver.tabled`."""
 
-    def __init__(self, solver: "ExactSolver") -> None:
-        self._solver = solver
+    def __init__(self, tabled: Callable[[RoutingProblem], Instance | None]) -> None:
+        self._tabled = tabled
         self._filled: _Filled | None = None
 
     def plan(self, problem: RoutingProblem) -> Plan | None:
@@ -125,10 +123,8 @@ class TaskTable:
         state = _state(self._filled, problem) if self._filled is not None else None
         if state is not None:
             return state
-        if not self._solver.applies(problem):
-            return None
-        instance = make_instance(problem, problem.integers.metric)
-        if not self._solver.table_fits(instance):
+        instance = self._tabled(problem)
+        if instance is None:
             return None
         self._filled = _Filled(problem, instance, cast(CostTable, filled_table(instance)))
         return _state(self._filled, problem)

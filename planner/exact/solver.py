@@ -81,8 +81,10 @@ class ExactSolver:
             return f"{len(problem.shipments)} shipments are more than {MAX_SEARCHED} and have too many bins"
         return "" if problem.integers.is_metric else "the distances break the triangle inequality"
 
-    def table_fits(self, instance: Instance) -> bool:
-        return full_table_bytes(instance) <= self.table_bytes
+    def tabled(self, problem: RoutingProblem) -> Instance | None:
+        """Return the arrays of a problem that a full table can solve, or None for other problems."""
+        instance = make_instance(problem, problem.integers.metric) if self.applies(problem) else None
+        return instance if instance and full_table_bytes(instance) <= self.table_bytes else None
 
     def _plans(
         self,

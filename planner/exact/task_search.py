@@ -59,7 +59,7 @@ class TaskSearch:
         """Return True if all plans come from this search, because the task began with more than 24 objects."""
         if not self._solver.applies(problem) or not (self._began_large or self._is_large(problem)):
             return False
-        return not self._solver.table_fits(make_instance(problem, problem.integers.metric))
+        return self._solver.tabled(problem) is None
 
     def _is_large(self, problem: RoutingProblem) -> bool:
         return len(problem.shipments) > self._solver.most_searched

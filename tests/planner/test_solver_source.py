@@ -4,6 +4,7 @@ import pytest
 from planning_cases import Task, two_rooms
 
 from planner.checker import check
+from planner.exact import full_table
 from planner.exact.solver import ExactSolver
 from planner.exact.task_search import TASK_WORK, TaskSearch
 from planner.plan import Status
@@ -42,8 +43,8 @@ def test_plans_stay_optimal_through_deviations_and_mishaps(geodesics, solver, se
 
 
 def test_a_table_is_filled_once_while_nothing_is_moved(geodesics, monkeypatch):
-    filled = []
-    monkeypatch.setattr(ExactSolver, "table_fits", lambda *_: not filled.append(None))
+    filled, fill = [], full_table.filled_table
+    monkeypatch.setattr(full_table, "filled_table", lambda table: filled.append(None) or fill(table))
     task, planner = Task(geodesics, 8, 1), SolverSource(geodesics, TABLE)
     while (plan := planner.plan(task.state, None, shown=False)).visits:
         picks = [visit for visit in plan.visits if visit.object in task.loose and visit.kind == "pick"]
