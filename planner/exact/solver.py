@@ -84,7 +84,7 @@ class ExactSolver:
     def tabled(self, problem: RoutingProblem) -> Instance | None:
         """Return the arrays of a problem that a full table can solve, or None for other problems."""
         instance = make_instance(problem, problem.integers.metric) if self.applies(problem) else None
-        return instance if instance and full_table_bytes(instance) <= self.table_bytes else None
+        return instance if instance is not None and full_table_bytes(instance) <= self.table_bytes else None
 
     def _plans(
         self,
