@@ -152,7 +152,7 @@ class NavMesh:
         """
         island = self.islands[0]
         x_min, y_min, x_max, y_max = island.bounds
-        if count is None:  # scalars are four times as fast as arrays here
+        if count is None:  # a point that is drawn without arrays takes a quarter of the time
             while True:
                 x, y = rng.uniform(x_min, x_max), rng.uniform(y_min, y_max)
                 if shapely.contains_xy(island, x, y):

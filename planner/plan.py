@@ -4,14 +4,9 @@ import enum
 import math
 import numbers
 from dataclasses import dataclass, replace
-from typing import Annotated, NamedTuple
-
-from msgspec import Meta
+from typing import NamedTuple
 
 from planner.errors import ProblemError
-
-# Every integer up to 2^53 can be represented exactly as a float.
-Whole = Annotated[int, Meta(ge=-(1 << 53), le=1 << 53)]
 
 
 class Proof(enum.Enum):
@@ -42,15 +37,15 @@ class Certificate:
     unit: float  # length of one unit in metres
     # Lower bound in units before any search: the optimal length (full table, exhaustive), the bound of the
     # relaxation or of the cuts, or the length of the spanning tree. A search may have raised the plan's bound further.
-    root: Whole
+    root: int
     # Groups of shipments. The relaxation only counts the remaining shipments of each group.
-    groups: tuple[tuple[Whole, ...], ...] = ()
-    multipliers: tuple[Whole, ...] = ()  # price for picking up each shipment, in units divided by `parts`
+    groups: tuple[tuple[int, ...], ...] = ()
+    multipliers: tuple[int, ...] = ()  # price for picking up each shipment, in units divided by `parts`
     # Each cut is an object, a multiplier in units divided by `parts`, and a set of nodes of the graph of states, as
     # numbered in `planner.cuts_checker`. The set is entered at least as often as the object is picked up in it.
-    cuts: tuple[tuple[Whole, Whole, tuple[Whole, ...]], ...] = ()
-    parts: Whole = 1
-    branched: Whole = 0  # number of nodes of branch and bound, which no checker repeats
+    cuts: tuple[tuple[int, int, tuple[int, ...]], ...] = ()
+    parts: int = 1
+    branched: int = 0  # number of nodes of branch and bound, which no checker repeats
 
 
 class Status(enum.Enum):
@@ -109,7 +104,7 @@ class Plan:
             raise ProblemError(f"Plan.status must be a Status, got {self.status!r}")
 
     def bounded(self, lower_bound: float, tolerance: float) -> "Plan":
-        """Return this plan with another lower bound in metres. It is OPTIMAL if it is as short, up to the tolerance."""
+        """Return this plan with another lower bound, as OPTIMAL if it is longer by at most `tolerance` metres."""
         optimal = self.cost - lower_bound <= tolerance
         status = Status.OPTIMAL if optimal else Status.FEASIBLE
         return replace(self, lower_bound=self.cost if optimal else lower_bound, status=status)

@@ -1,11 +1,11 @@
 """Convert routing problems, plans and certificates to and from JSON, for `mjsim plan`."""
 
 import json
-from typing import Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import msgspec
 import numpy as np
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from mjsim.support.files import read_json
 from planner.errors import ProblemError
@@ -13,12 +13,14 @@ from planner.plan import Certificate, Plan, Proof, Status, Visit, VisitKind
 from planner.problem import RoutingProblem, Shipment
 
 FORMAT = 2
+EXACT = 1 << 53  # every integer up to this value can be represented exactly as a float
 PROBLEM = (
     'a problem is {"distances": [[0, 3], [3, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}, '
     'and if need be "start": 0, "onboard": [1], "capacity": 2'
 )
 CLAIM = "a claim is what `mjsim plan --certificate` writes"
 
+Whole = Annotated[int, Meta(ge=-EXACT, le=EXACT)]
 Action = Literal["pick", "place", "place onboard"]
 T = TypeVar("T")
 
@@ -36,13 +38,24 @@ class _Problem(Struct, forbid_unknown_fields=True):
     capacity: int = 2
 
 
+class _Certificate(Struct, forbid_unknown_fields=True):
+    proof: Proof
+    unit: float
+    root: Whole
+    groups: tuple[tuple[Whole, ...], ...]
+    multipliers: tuple[Whole, ...]
+    cuts: tuple[tuple[Whole, Whole, tuple[Whole, ...]], ...] = ()
+    parts: Whole = 1
+    branched: Whole = 0
+
+
 class _Claim(Struct, forbid_unknown_fields=True):
     format: Literal[2]
     visits: list[tuple[Action, int]]
     cost: float
     lower_bound: float
     status: Status
-    certificate: Certificate | None
+    certificate: _Certificate | None
 
 
 def problem_from_json(text: str | bytes) -> RoutingProblem:
@@ -102,8 +115,10 @@ def claim_from_json(text: str | bytes, problem: RoutingProblem) -> Plan:
             unknown object. The message is one line.
     """
     raw = _decode(text, _Claim, CLAIM)
+    proof = raw.certificate
+    certificate = None if proof is None else Certificate(**msgspec.structs.asdict(proof))
     visits = tuple(_visit(problem, k, *visit) for k, visit in enumerate(raw.visits))
-    return Plan(visits, raw.cost, raw.lower_bound, raw.status, seconds=0.0, certificate=raw.certificate)
+    return Plan(visits, raw.cost, raw.lower_bound, raw.status, seconds=0.0, certificate=certificate)
 
 
 def _decode(text: str | bytes, kind: type[T], hint: str) -> T:

@@ -62,16 +62,14 @@ class RegretEvaluator:
 
     def __post_init__(self) -> None:
         self._search = self.search or TaskSearch(self.solver, self.limit)
-        self._problems, self._table = (
-            TaskProblems(self.geodesics, self.capacity),
-            TaskTable(self.solver.tabled),
-        )
+        self._problems = TaskProblems(self.geodesics, self.capacity)
+        self._table = TaskTable(self.solver.tabled)
         self._last: tuple[TaskState, dict[Visit, Regret]] | None = None
         # Problem of the last state, and the plan for it
         self._planned: tuple[RoutingProblem, Plan] | None = None
 
     def limited(self, limit: SolveLimit) -> "RegretEvaluator":
-        """Return a copy with a limit on each search, for use in another thread. Both share the budget of states."""
+        """Return a copy for another thread, with a limit on each search. It shares the budget of this evaluator."""
         return replace(self, limit=limit, search=self._search)
 
     def all(self, state: TaskState, plan: Plan | None = None) -> dict[Visit, Regret]:
@@ -151,11 +149,8 @@ class RegretEvaluator:
 
 def same_state(one: TaskState, other: TaskState) -> bool:
     """Return True if the person and all objects are in the same places in both states."""
-    return one is other or (one.position, one.carried, one.loose) == (
-        other.position,
-        other.carried,
-        other.loose,
-    )
+    first, second = ((state.position, state.carried, state.loose) for state in (one, other))
+    return one is other or first == second
 
 
 def regrets(
@@ -258,10 +253,8 @@ def _around_best(
 
 def _least(bound: Bound, problem: RoutingProblem) -> Costs:
     """Return a lower bound on the cost of each possible next visit, in units."""
-    n, table = len(problem.shipments), bound.table
-    relaxed = costs_in(
-        moves_of(bound.instance), table, len(table.bin) - 1, problem.names[:n], problem.names[n:]
-    )
+    n, moves, table = len(problem.shipments), moves_of(bound.instance), bound.table
+    relaxed = costs_in(moves, table, len(table.bin) - 1, problem.names[:n], problem.names[n:])
     return {visit: cost - bound.prices for visit, cost in relaxed.items()}
 
 

@@ -122,10 +122,8 @@ class Relaxation:
                 return None
             if ((here.left == 0) & (here.held == self._bins)).any():
                 return True, states
-            here, after = (
-                self._best([after, *(self._best([s], limit) for s in self._picked(here))], limit),
-                NONE,
-            )
+            here = self._best([after, *(self._best([s], limit) for s in self._picked(here))], limit)
+            after = NONE
         return False, states
 
     def _begin(self) -> tuple[StateArrays, StateArrays]:

@@ -11,7 +11,7 @@ from planner.exact.solver import ExactSolver
 from planner.exact.task_search import TaskSearch
 from planner.exact.warm_start import NOTHING_KNOWN
 from planner.geodesics import Geodesics
-from planner.plan import Plan, Visit, VisitKind
+from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem, tour_length
 from planner.route import XY, PlanSource, Route, TaskState, remaining
 from planner.solvers import SolveLimit, Solver
@@ -53,7 +53,9 @@ class _BackgroundSearch:
         """Return a plan with the shown visits and the lower bound of another plan."""
         cost = tour_length(self.problem, self.shown)
         plan = replace(other, visits=self.shown, cost=cost)
-        return plan.bounded(other.lower_bound, self.problem.tolerance(cost))
+        # An unproven plan may be within the tolerance for rounding errors, which proves nothing.
+        tolerance = self.problem.tolerance(cost) if other.status is Status.OPTIMAL else 0.0
+        return plan.bounded(other.lower_bound, tolerance)
 
 
 class SolverSource(PlanSource):

@@ -94,7 +94,7 @@ def _finish(inst: Instance, i: int, before: NDArray[np.int64]) -> int:
 def tour_actions(moves: Moves, order: NDArray[np.int64]) -> list[int]:
     """Return the actions of a shortest tour with a given order of picks, as defined in `Solution`."""
     ways: Ways = {len(moves.end) - 1: (0, [])}
-    # Objects may be placed after each pick, and twice at the root.
+    # The person may visit two bins before the first pick, and one bin after each pick.
     for x in [NOTHING, NOTHING, *(move for k in order.tolist() for move in (k, NOTHING))]:
         after: Ways = dict(ways) if x == NOTHING else {}
         for place, (length, actions) in ways.items():

@@ -7,7 +7,7 @@ the bit mask of the remaining objects. `planner.exact.moves` numbers the places.
 from typing import NamedTuple
 
 from mjsim.support.kernels import kernel
-from planner.exact.moves import Moves
+from planner.exact.moves import NOTHING, Moves
 from planner.exact.multipliers import Bound
 from planner.exact.nodes import FIRST_ROOM, NO_PARENT, Nodes, new_nodes, offer, with_room, with_room_among
 from planner.exact.table import INFINITE, CostTable
@@ -86,7 +86,7 @@ def expand_some(
     smallest, expanded, end = INFINITE, 0, -1
     for k in range(first, last):
         place, left = here.key[k] & ((1 << PLACE_BITS) - 1), here.key[k] >> PLACE_BITS
-        if here.total[k] >= limit or (moves.end[place, n, 0] >= 0) != carrying:
+        if here.total[k] >= limit or (moves.end[place, NOTHING, 0] >= 0) != carrying:
             continue
         expanded += 1
         if left == 0 and not carrying and (end < 0 or here.cost[k] < here.cost[end]):
@@ -95,21 +95,20 @@ def expand_some(
             after, dropped = with_room_among(after, 2 * n, width)
             smallest = min(smallest, dropped)
         row = row_of(table, left)
-        for j in range(n + 1 if carrying else n):
-            if j < n and not left >> j & 1:
+        for j in range(NOTHING if carrying else 0, n):
+            if j >= 0 and not left >> j & 1:
                 continue
+            below, price, then = row, 0, left
+            if j >= 0:
+                below, price, then = row - table.stride[j], table.multipliers[j], left ^ (1 << j)
             for way in range(2):
                 there = moves.end[place, j, way]
                 if there < 0:
                     continue
-                cost = here.cost[k] + moves.length[place, j, way]
-                if j == n:
-                    total = cost + table.entries[row * table.width + moves.column[there]]
-                    if total < limit:
-                        offer(here, (left << PLACE_BITS) | there, cost, total, 2 * k + 1)
-                    continue
-                cost += table.multipliers[j]
-                total = cost + table.entries[(row - table.stride[j]) * table.width + moves.column[there]]
-                if total < limit:
-                    offer(after, ((left ^ (1 << j)) << PLACE_BITS) | there, cost, total, 2 * k)
+                cost = here.cost[k] + moves.length[place, j, way] + price
+                total = cost + table.entries[below * table.width + moves.column[there]]
+                if total < limit and j >= 0:
+                    offer(after, (then << PLACE_BITS) | there, cost, total, 2 * k)
+                elif total < limit:
+                    offer(here, (then << PLACE_BITS) | there, cost, total, 2 * k + 1)
     return after, smallest, expanded, end

@@ -87,7 +87,10 @@ class _Filled:
 
 
 class TaskTable:
-    """A cache of a full table, which is kept until an object is moved. `tabled` is `ExactSolver.tabled`."""
+    """A cache of a full table, which is kept until an object is moved.
+
+    `tabled` returns the arrays of a problem that a full table can solve, or None, as `ExactSolver.tabled` does.
+    """
 
     def __init__(self, tabled: Callable[[RoutingProblem], Instance | None]) -> None:
         self._tabled = tabled
@@ -114,10 +117,8 @@ class TaskTable:
         state = self._at(problem)
         if state is None:
             return None
-        carried = problem.names[len(problem.shipments) :]
-        return costs_in(
-            moves_of(state.instance), state.table, state.row, state.names, carried
-        ), state.instance.unit
+        carried, moves = problem.names[len(problem.shipments) :], moves_of(state.instance)
+        return costs_in(moves, state.table, state.row, state.names, carried), state.instance.unit
 
     def _at(self, problem: RoutingProblem) -> TableState | None:
         state = _state(self._filled, problem) if self._filled is not None else None

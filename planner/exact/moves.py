@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from planner.exact.instance import FAR, Instance
 
 NOWHERE = -1  # end of a move that is not possible
-NOTHING = (
-    -1
-)  # last index, which stands for the moves that pick up nothing, and bin of the object in an empty hand
+# Index of the moves that pick up nothing, which is the last one, and bin of the object in an empty hand
+NOTHING = -1
 
 
 class Moves(NamedTuple):

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.exact.instance import FAR, Instance
-from planner.exact.moves import Moves
+from planner.exact.moves import NOTHING, Moves
 from planner.plan import Certificate
 
 BIN_ROWS = 50_000  # row limit of a table with one group per bin, enough for 30 objects and 6 bins
@@ -139,7 +139,7 @@ def walk(moves: Moves, table: CostTable, row: int, actions: NDArray[np.int64]) -
         left[table.group[j]] = row // table.stride[j] % (table.size[table.group[j]] + 1)
     while True:
         best, picked, then = INFINITE, n, -1
-        for j in range(-1, n):  # the first move, with index `NOTHING`, picks up nothing
+        for j in range(NOTHING, n):
             if j >= 0 and left[table.group[j]] == 0:
                 continue
             below, price = (row - table.stride[j], table.multipliers[j]) if j >= 0 else (row, 0)

@@ -115,6 +115,18 @@ def test_of_two_equal_tours_the_shown_one_stays_and_takes_over_the_proof(geodesi
         assert guide.improve(mirrored) is None
 
 
+def test_a_bound_within_the_rounding_of_an_unproven_plan_is_no_proof(geodesics, mirrored):
+    script = Script(one_after_another(0, 1), one_after_another(1, 0))
+    with live(geodesics, script) as guide:
+        shown = asked(guide, mirrored)
+        script.bound = shown.plan.cost - 5e-4  # two tours within 0.8 mm count as equal here
+        script.go.set()
+        guide.wait()
+        better = guide.improve(mirrored)
+        assert better.visits == shown.visits
+        assert (better.plan.status, better.plan.lower_bound) == (Status.FEASIBLE, script.bound)
+
+
 def test_a_shorter_tour_is_shown_unless_it_is_too_late(geodesics):
     state = TaskState(
         (1.0, 1.0), {"near": (1.0, 2.0), "far": (1.0, 5.0)}, (), {"near": (1.0, 2.2), "far": (1.0, 5.2)}

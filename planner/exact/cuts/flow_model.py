@@ -13,9 +13,8 @@ from planner.exact.cuts.connectivity import Cut
 from planner.exact.cuts.graph import StateGraph
 from planner.solvers import Deadline
 
-MARGIN = (
-    0.05  # how long before a deadline solvers stop, because they check the time only now and then, in seconds
-)
+# How long before a deadline solvers stop, because they check the time only now and then, in seconds
+MARGIN = 0.05
 GAP = 0.4  # difference between length and bound at which HiGHS stops, because lengths are whole numbers
 
 

@@ -195,6 +195,16 @@ def fault_of(folder, capsys, name, document):
         ("claim", {"status": "perfect"}, "Invalid enum value 'perfect' - at `$.status`"),
         ("claim", {"format": 1}, "Invalid enum value 1 - at `$.format`"),
         ("claim", {"certificate": PROOF | {"root": 10**400}}, "$.certificate.root"),
+        (
+            "claim",
+            {"certificate": PROOF | {"root": 1, "more": 1}},
+            "unknown field `more` - at `$.certificate`",
+        ),
+        (
+            "claim",
+            {"certificate": {"proof": "full-table", "unit": 1.0, "root": 1}},
+            "required field `groups`",
+        ),
         ("claim", {"more": 1}, "unknown field `more`"),
     ],
 )
